@@ -1,0 +1,138 @@
+"""Declared settings: typed, bounded dataclass fields, and the one place that turns raw values into them."""
+
+from __future__ import annotations
+
+import math
+import types
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from difflib import get_close_matches
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from koopcli.errors import InvalidValueError, KoopError, UsageError
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a raw value came from: what an error message names, and what a wrong name costs."""
+
+    label: str = ""
+    misnamed: type[KoopError] = UsageError
+
+    def say(self, text: str) -> str:
+        """``text`` with the origin in front."""
+        return f"{self.label}: {text}" if self.label else text
+
+
+COMMAND_LINE = Origin()
+
+
+def from_file(path: object) -> Origin:
+    """The origin of values read from a user's file."""
+    return Origin(str(path), InvalidValueError)
+
+
+def setting(
+    default: Any = MISSING,
+    *,
+    help: str = "",
+    low: float | None = None,
+    above: float | None = None,
+    high: float | None = None,
+    unit: str = "",
+) -> Any:
+    """A dataclass field with its documentation and bounds: ``low <= value``, ``above < value``, ``value <= high``."""
+    meta = {"help": help, "low": low, "above": above, "high": high, "unit": unit}
+    return field(metadata=meta) if default is MISSING else field(default=default, metadata=meta)
+
+
+def build(cls: type[T], values: Mapping[str, object], origin: Origin = COMMAND_LINE, prefix: str = "") -> T:
+    """An instance of the settings class ``cls`` from raw ``values``, each coerced to its declared type.
+
+    Raises ``origin.misnamed`` for a key or an enumerated value that does not exist and ``InvalidValueError``
+    for a missing key, a wrong type, a value out of bounds, nan or inf.
+    """
+    declared = {f.name: f for f in fields(cls)}  # type: ignore[arg-type]
+    for key in values:
+        if key not in declared:
+            raise origin.misnamed(origin.say(f"unknown setting '{prefix}{key}'{candidates(key, declared)}"))
+    hints = get_type_hints(cls)
+    done: dict[str, object] = {}
+    for name, spec in declared.items():
+        if name in values:
+            done[name] = coerce(hints[name], values[name], f"{prefix}{name}", spec.metadata, origin)
+        elif spec.default is MISSING and spec.default_factory is MISSING:
+            raise InvalidValueError(origin.say(f"missing key '{prefix}{name}'"))
+    return cls(**done)
+
+
+def coerce(  # noqa: PLR0911  (one return for each kind of type reads best)
+    kind: Any, value: object, name: str, bounds: Mapping[str, Any], origin: Origin
+) -> object:
+    """``value`` as the declared type ``kind``, so that 1 and 1.0 are one setting; bounds checked."""
+    if isinstance(kind, type) and is_dataclass(kind):
+        if isinstance(value, Mapping):
+            return build(kind, value, origin, f"{name}.")
+        if type(value) is kind:
+            return value
+        raise InvalidValueError(origin.say(f"'{name}' must be a table of settings, got {value!r}"))
+    if get_origin(kind) is Literal:
+        return _choice(get_args(kind), value, name, origin)
+    if get_origin(kind) in (Union, types.UnionType):
+        if value is None:
+            return None
+        (inner,) = [k for k in get_args(kind) if k is not type(None)]
+        return coerce(inner, value, name, bounds, origin)
+    if get_origin(kind) is tuple:
+        if isinstance(value, str) or not isinstance(value, (list, tuple)) or not value:
+            raise InvalidValueError(origin.say(f"'{name}' must be a non-empty list such as [1, 2], got {value!r}"))
+        inner = get_args(kind)[0]
+        return tuple(coerce(inner, v, f"{name}[{i}]", bounds, origin) for i, v in enumerate(value))
+    number = _number(kind, value, name, origin)
+    _within(number, name, bounds, origin)
+    return number
+
+
+def candidates(name: str, known: Any) -> str:
+    """The tail of an error message that lists what would have been right, the nearest first."""
+    names = [str(k) for k in known]
+    near = get_close_matches(name, names, n=1)
+    listed = ", ".join(names) if names else "none"
+    return f": did you mean '{near[0]}'? (known: {listed})" if near else f" (known: {listed})"
+
+
+def _choice(allowed: tuple[Any, ...], value: object, name: str, origin: Origin) -> object:
+    if value not in allowed:
+        raise origin.misnamed(origin.say(f"'{name}' cannot be {value!r}; choose one of {', '.join(map(str, allowed))}"))
+    return value
+
+
+def _number(kind: Any, value: object, name: str, origin: Origin) -> Any:
+    wanted = {int: "a whole number", float: "a number", str: "a text", bool: "true or false"}[kind]
+    wrong = InvalidValueError(origin.say(f"'{name}' must be {wanted}, got {value!r}"))
+    if isinstance(value, bool) != (kind is bool):
+        raise wrong
+    if kind is int and isinstance(value, float) and value.is_integer():
+        return int(value)
+    if kind is float and isinstance(value, int):
+        return float(value)
+    if not isinstance(value, kind):
+        raise wrong
+    return value
+
+
+def _within(value: Any, name: str, bounds: Mapping[str, Any], origin: Origin) -> None:
+    if isinstance(value, str):
+        return
+    unit = f" {bounds['unit']}" if bounds.get("unit") else ""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InvalidValueError(origin.say(f"'{name}' must be a finite number, got {value}"))
+    low, above, high = bounds.get("low"), bounds.get("above"), bounds.get("high")
+    if low is not None and value < low:
+        raise InvalidValueError(origin.say(f"'{name}' must be at least {low}{unit}, got {value}"))
+    if above is not None and value <= above:
+        raise InvalidValueError(origin.say(f"'{name}' must be above {above}{unit}, got {value}"))
+    if high is not None and value > high:
+        raise InvalidValueError(origin.say(f"'{name}' must be at most {high}{unit}, got {value}"))

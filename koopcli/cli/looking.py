@@ -1,0 +1,196 @@
+"""The commands that look into the store and after it: ls, show, path, pin, unpin."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from koopcli.cli.options import JsonOption, StoreOption
+from koopcli.cli.session import open_store, print_json
+from koopcli.console import show_table
+from koopcli.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    from koopcli.stages.base import Task
+    from koopcli.stages.pipeline import Artefact
+
+NameArgument = Annotated[str, typer.Argument(help="An artefact, by name or any unambiguous beginning of it.")]
+
+
+def ls(
+    stage: Annotated[str | None, typer.Argument(help="Only artefacts of this stage.")] = None,
+    store: StoreOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """List the artefacts of the store, oldest first.
+
+    Example: koop ls evaluate
+    """
+    from koopcli.stages.registry import STAGES
+    from koopcli.store.files import size_text
+    from koopcli.store.pins import pins
+
+    if stage is not None and stage not in STAGES:
+        raise UnknownNameError(f"unknown stage '{stage}' (known: {', '.join(STAGES)})")
+    console, shelf = open_store(store)
+    found = [shelf.record(s, key) for s, key in shelf.index() if stage in (None, s)]
+    records = sorted((r for r in found if r is not None), key=lambda r: (r.provenance["time"], r.stage, r.key))
+    pinned = {name for names in pins(shelf).values() for name in names}
+    rows = [
+        {
+            "name": record.name,
+            "made": record.provenance["time"],
+            "seconds": record.provenance["seconds"],
+            "bytes": record.size,
+            "object": shelf.has_object(record),
+            "pinned": f"{record.stage}/{record.key}" in pinned,
+            "settings": record.recipe["settings"],
+        }
+        for record in records
+    ]
+    if as_json:
+        print_json(rows)
+        return
+    console.note(f"store: {shelf.root}")
+    table = [
+        [
+            row["name"],
+            row["made"].replace("T", " ")[:16],
+            f"{row['seconds']:.1f} s",
+            size_text(row["bytes"]) if row["object"] else "missing",
+            "pinned" if row["pinned"] else "",
+            _brief(row["settings"]),
+        ]
+        for row in rows
+    ]
+    show_table(["artefact", "made (UTC)", "took", "size", "", "settings"], table, title="", file=sys.stdout)
+
+
+def show(
+    name: NameArgument,
+    as_csv: Annotated[bool, typer.Option("--csv", help="The per-trajectory table of an evaluation.")] = False,
+    store: StoreOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show an artefact: its figures, every setting behind it, its arrays, and how it was made.
+
+    Example: koop show evaluate/3f2a --csv > scores.csv
+    """
+    artefact, task, path = _obtain(name, store)
+    if as_csv:
+        _print_csv(artefact)
+        return
+    record, packed = artefact.record, artefact.content.pack()
+    full = {
+        "name": record.name,
+        "path": str(path),
+        "figures": artefact.figures,
+        "settings": dict(_settings(task, record.stage)),
+        "inputs": dict(record.lineage),
+        "arrays": {
+            name: {"shape": list(a.values.shape), "axes": list(a.axes), "units": a.units}
+            for name, a in packed.arrays.items()
+        },
+        "provenance": dict(record.provenance),
+    }
+    if as_json:
+        print_json(full)
+        return
+    show_table(["", ""], [[key, text] for key, text in _rows(full)], title="", file=sys.stdout)
+
+
+def path(name: NameArgument, store: StoreOption = None) -> None:
+    """Print where the HDF5 file of an artefact lies, after verifying it.
+
+    Example: h5dump -n $(koop path fit-edmd/3f2a)
+    """
+    print(_obtain(name, store)[2])
+
+
+def pin(name: NameArgument, store: StoreOption = None) -> None:
+    """Mark an artefact to be kept.
+
+    Example: koop pin fit-edmd/3f2a
+    """
+    from koopcli.store import pins
+
+    console, shelf = open_store(store)
+    record = shelf.find(name)
+    pins.pin(shelf, pins.label_of(record), [record])
+    console.note(f"pinned {record.name}")
+
+
+def unpin(
+    name: Annotated[str, typer.Argument(help="An artefact by name or beginning, or the label of a pin.")],
+    store: StoreOption = None,
+) -> None:
+    """Take back a pin, of one artefact or of a reproduction.
+
+    Example: koop unpin fit-edmd/3f2a
+    """
+    from koopcli.store import pins
+
+    console, shelf = open_store(store)
+    label = name if name in pins.pins(shelf) else pins.label_of(shelf.find(name))
+    pins.unpin(shelf, label)
+    console.note(f"unpinned {label}")
+
+
+def _obtain(name: str, store: Path | None) -> tuple[Artefact, Task, Path]:
+    """The named artefact, verified, made again when damaged; its task and its path."""
+    from koopcli.stages.pipeline import Pipeline
+
+    console, shelf = open_store(store)
+    pipeline = Pipeline(shelf, console)
+    task = pipeline.named(name)
+    artefact = pipeline.make(task)
+    return artefact, task, shelf.path(artefact.record)
+
+
+def _settings(task: Task, role: str) -> Iterator[tuple[str, Any]]:
+    """The settings of a task and of all behind it, each under the chain of roles that leads to it."""
+    yield role, dict(asdict(task.settings))
+    for name, upstream in task.inputs:
+        yield from _settings(upstream, f"{role} < {name}")
+
+
+def _rows(value: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Nested facts as rows of dotted names and short texts."""
+    for key, entry in value.items():
+        name = f"{prefix}{key}"
+        if isinstance(entry, dict) and "axes" not in entry:
+            yield from _rows(entry, f"{name}: " if not prefix else f"{name}.")
+        elif isinstance(entry, dict):
+            shape = " × ".join(map(str, entry["shape"]))
+            yield name, f"{shape} ({', '.join(entry['axes'])}) in {entry['units']}"
+        elif isinstance(entry, (list, tuple)):
+            yield name, " ".join(map(str, entry))
+        else:
+            yield name, f"{entry:.6g}" if isinstance(entry, float) else str(entry)
+
+
+def _brief(settings: dict[str, Any]) -> str:
+    """Settings in one short text, nested ones left out."""
+    return " ".join(f"{key}={value}" for key, value in settings.items() if not isinstance(value, (dict, list)))
+
+
+def _print_csv(artefact: Artefact) -> None:
+    table = getattr(artefact.content, "table", None)
+    if table is None:
+        raise UnknownNameError(f"{artefact.record.name} has no table; --csv takes an evaluation")
+    header, rows = table()
+    writer = csv.writer(sys.stdout, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this file."""
+    for command in (ls, show, path, pin, unpin):
+        app.command(command.__name__, rich_help_panel="Look into the store and after it")(command)

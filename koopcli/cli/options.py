@@ -1,0 +1,36 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+StoreOption = Annotated[
+    Path | None,
+    typer.Option("--store", metavar="DIR", help="Folder of artefacts. [default: $KOOP_STORE or ./artefacts]"),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the name or table.")]
+DryRunOption = Annotated[
+    bool,
+    typer.Option("--dry-run", help="Say what would be made or reused, how long and how large; make nothing."),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="STAGE.KEY=VALUE",
+        help="Change one setting of any stage, such as vehicle.Jzz=1731, sample.seed=1, test.excitation=held. "
+        "May be repeated.",
+    ),
+]
+ExperimentOption = Annotated[
+    str,
+    typer.Option("--experiment", metavar="NAME|FILE", help="Where settings come from: paper, smoke or a TOML file."),
+]
+VehicleOption = Annotated[
+    str | None,
+    typer.Option("--vehicle", metavar="NAME|FILE", help="A shipped vehicle or your own TOML file."),
+]
+SeedOption = Annotated[int | None, typer.Option("--seed", help="Seed of every draw.", show_default=False)]

@@ -1,0 +1,97 @@
+"""The command that draws."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, get_args
+
+import typer
+
+from koopcli.checks import candidates
+from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption
+from koopcli.cli.session import open_session, print_json
+from koopcli.config.settings import FigureName, ImageFormat
+from koopcli.console import show_table
+from koopcli.errors import InvalidValueError, StorageError, UnknownNameError, UsageError
+
+if TYPE_CHECKING:
+    from koopcli.stages.pipeline import Artefact
+
+
+def plot(
+    figure: Annotated[str | None, typer.Argument(help="Name of the figure; --list shows them.")] = None,
+    artefacts: Annotated[
+        list[str] | None, typer.Argument(metavar="[ARTEFACT]...", help="What to draw; made when left out.")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="Write the image: .png, .svg or .pdf."),
+    ] = None,
+    list_: Annotated[bool, typer.Option("--list", help="List the figures.")] = False,
+    set_: SetOption = None,
+    experiment: ExperimentOption = "paper",
+    store: StoreOption = None,
+    dry_run: DryRunOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Draw a figure from artefacts, making them when they are not named.
+
+    Example: koop plot orders -o orders.pdf
+    """
+    if list_:
+        _list(as_json=as_json)
+        return
+    if figure is None:
+        raise UsageError(f"which figure? Name one of: {', '.join(get_args(FigureName))}")
+    if figure not in get_args(FigureName):
+        raise UnknownNameError(f"unknown figure '{figure}'{candidates(figure, get_args(FigureName))}")
+    image = _format(output)
+    session = open_session(store, experiment, set_)
+    from koopcli.stages import recipes
+
+    if artefacts:
+        evaluations = [session.named(name, ["evaluate"], f"the figure '{figure}'", ()) for name in artefacts]
+    else:
+        evaluations = recipes.order_sweep(session.experiment)
+
+    def export(artefact: Artefact) -> None:
+        if output is not None:
+            _write(output, artefact.content.image)
+            session.console.note(f"wrote {output}")
+        elif not as_json:
+            session.console.note("add -o FILE.png, .svg or .pdf to write the image")
+
+    task = recipes.orders_figure(evaluations, image)
+    session.run(task, as_json=as_json, dry_run=dry_run, extra=export)
+
+
+def _format(output: Path | None) -> ImageFormat:
+    if output is None:
+        return "png"
+    ending = output.suffix.lower().lstrip(".")
+    for known in get_args(ImageFormat):
+        if ending == known:
+            return known  # type: ignore[no-any-return]
+    raise InvalidValueError(f"{output}: unknown ending; write to a file ending in .{', .'.join(get_args(ImageFormat))}")
+
+
+def _write(path: Path, content: bytes) -> None:
+    try:
+        path.write_bytes(content)
+    except OSError as error:
+        raise StorageError(f"cannot write {path}: {error.strerror}") from error
+
+
+def _list(*, as_json: bool) -> None:
+    from koopcli.figures.registry import FIGURES
+
+    if as_json:
+        print_json({name: kind.about for name, kind in FIGURES.items()})
+        return
+    show_table(["figure", "shows"], [[name, kind.about] for name, kind in FIGURES.items()], title="", file=sys.stdout)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command of this file."""
+    app.command("plot", rich_help_panel="Make")(plot)

@@ -1,0 +1,150 @@
+"""The command that reproduces the paper and puts its figures beside the paper's."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption
+from koopcli.cli.session import Session, open_session, print_json, show_plan
+from koopcli.config.experiment import Experiment, load_experiment
+from koopcli.console import show_table
+from koopcli.errors import UsageError
+
+if TYPE_CHECKING:
+    from koopcli.stages.comparison import Table
+    from koopcli.stages.reproduction import Sweep
+
+Method = Literal["edmd"]
+SWEPT = {
+    "fit-edmd.order": "reproduce.orders=[6,7]",
+    "sample.draw": 'reproduce.draws=["even"]',
+    "test.excitation": 'reproduce.excitations=["held"]',
+}
+
+
+def reproduce(
+    method: Annotated[Method, typer.Argument(help="edmd: the paper's first method.")] = "edmd",
+    smoke: Annotated[bool, typer.Option("--smoke", help="A reduced grid, in seconds (experiment 'smoke').")] = False,
+    set_: SetOption = None,
+    experiment: ExperimentOption = "paper",
+    store: StoreOption = None,
+    dry_run: DryRunOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Reproduce the paper at full size: every order, training draw and kind of test inputs, beside its figures.
+
+    What --set changes is shown beside the unmodified run. The tables, the figure and the names of all artefacts
+    are written to a file, whose path is printed; everything made is pinned.
+
+    Example: koop reproduce edmd --set vehicle.Jzz=1731
+    """
+    if smoke and experiment != "paper":
+        raise UsageError("--smoke is an experiment of its own: leave out --experiment")
+    base = "smoke" if smoke else experiment
+    session = open_session(store, base, set_)
+    changes = [f"{section}.{key}" for section, values in session.changes.items() for key in values]
+    for name in changes:
+        if name in SWEPT:
+            raise UsageError(f"reproduce sweeps {name}: choose what it sweeps with --set '{SWEPT[name]}'")
+    from koopcli.stages import reproduction
+
+    runs = _runs(session, base, set_ or [])
+    if dry_run:
+        tasks = [task for _, one in runs for _, task in reproduction.sweep_tasks(one)]
+        steps = {step.task: step for task in tasks for step in session.pipeline.plan(task)}
+        show_plan(list(steps.values()), as_json=as_json)
+        return
+    with session.console.progress("reproduce edmd") as progress:
+        total = sum(1 for _, one in runs for _ in reproduction.sweep_tasks(one))
+        sweeps: list[tuple[str, Sweep]] = []
+        for label, one in runs:
+            sweeps.append((label, reproduction.run_sweep(one, session.pipeline)))
+            progress(sum(len(sweep.records) for _, sweep in sweeps), total)
+    _finish(session, sweeps, as_json=as_json)
+
+
+def _runs(session: Session, base: str, assignments: Sequence[str]) -> list[tuple[str, Experiment]]:
+    """The unmodified experiment, and the modified one beside it; a change of the sweep itself applies to both."""
+    plan = {"reproduce": session.changes["reproduce"]} if "reproduce" in session.changes else {}
+    changed = [text for text in assignments if not text.startswith("reproduce.")]
+    runs = [("here", load_experiment(base, plan))]
+    return [*runs, (" ".join(changed), session.experiment)] if changed else runs
+
+
+def _finish(session: Session, sweeps: list[tuple[str, Sweep]], *, as_json: bool) -> None:
+    """Tables on stderr, the same with all details in a file, its path on stdout."""
+    from koopcli.stages import comparison, reproduction
+    from koopcli.store.pins import pin
+
+    figure = reproduction.sweep_figure(sweeps[-1][1].experiment, session.pipeline)
+    tables = [comparison.paper_table(sweeps), *comparison.order_tables(sweeps)]
+    for table in tables:
+        show_table(table.header, table.rows, title=table.title, file=sys.stderr)
+    for note in comparison.NOTES:
+        session.console.note(note)
+    records = [record for _, sweep in sweeps for record in sweep.records] + [figure.record]
+    pin(session.pipeline.store, f"reproduce-edmd-{_identity(sweeps)}", records)
+    path = _write_report(session, sweeps, [*tables, comparison.full_table(sweeps)], figure.content.image)
+    if as_json:
+        print_json(
+            {
+                "name": path.stem,
+                "path": str(path),
+                "runs": [_run_json(label, sweep) for label, sweep in sweeps],
+            }
+        )
+    else:
+        print(path)
+
+
+def _identity(sweeps: Sequence[tuple[str, Sweep]]) -> str:
+    names = "\n".join(record.name for _, sweep in sweeps for record in sweep.records)
+    return hashlib.sha256(names.encode()).hexdigest()[:12]
+
+
+def _write_report(session: Session, sweeps: list[tuple[str, Sweep]], tables: list[Table], image: bytes) -> Path:
+    from koopcli.stages.comparison import NOTES
+    from koopcli.store.files import publish, storage_errors
+
+    root = session.pipeline.store.root
+    path = root / "reports" / f"edmd-{_identity(sweeps)}.md"
+    lines = ["# EDMD: paper versus here", ""]
+    for table in tables:
+        lines += [f"## {table.title}", "", *_markdown(table), ""]
+    lines += [
+        "## What it means",
+        "",
+        *(f"* {note}" for note in NOTES),
+        "",
+        f"![RMSE against order]({path.stem}.png)",
+        "",
+    ]
+    with storage_errors(root):
+        for target, content in ((path, "\n".join(lines).encode()), (path.with_suffix(".png"), image)):
+            if not target.is_file() or target.read_bytes() != content:
+                publish(target, content, root / "tmp")
+    return path
+
+
+def _markdown(table: Table) -> list[str]:
+    rows = [table.header, ["---", *("---:" for _ in table.header[1:])], *table.rows]
+    return [f"| {' | '.join(row)} |" for row in rows]
+
+
+def _run_json(label: str, sweep: Sweep) -> dict[str, Any]:
+    cells = [
+        {**vars(cell), "name": record.name, **figures}
+        for (cell, figures), record in zip(sweep.figures.items(), sweep.records, strict=True)
+    ]
+    return {"run": label, "evaluations": cells}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command of this file."""
+    app.command("reproduce", rich_help_panel="Reproduce")(reproduce)

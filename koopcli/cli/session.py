@@ -1,0 +1,126 @@
+"""What every making command does: settings in, one task made or planned, its name out."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from koopcli.config.experiment import Changes, Experiment, load_experiment, parse_set
+from koopcli.console import Console, show_table
+from koopcli.errors import UnknownNameError, UsageError
+
+if TYPE_CHECKING:
+    from koopcli.stages.base import Task
+    from koopcli.stages.pipeline import Artefact, Pipeline, Step
+
+
+@dataclass(frozen=True)
+class Session:
+    """The store, the console and the experiment of one command."""
+
+    pipeline: Pipeline
+    console: Console
+    experiment: Experiment
+    changes: Changes
+
+    def named(self, text: str, kinds: Sequence[str], role: str, unaffected: Sequence[str]) -> Task:
+        """The task of an artefact the user named as ``role``.
+
+        Raises ``UnknownNameError`` for another kind, ``UsageError`` when the command also changes settings of
+        stages other than ``unaffected``, which the named artefact has behind it.
+        """
+        task = self.pipeline.named(text)
+        if task.stage not in kinds:
+            raise UnknownNameError(
+                f"{text} is an artefact of stage {task.stage}; {role} must be of stage {' or '.join(kinds)}"
+            )
+        fixed = [f"{section}.{key}" for section in self.changes for key in self.changes[section]]
+        fixed = [name for name in fixed if name.partition(".")[0] not in unaffected]
+        if fixed:
+            raise UsageError(f"{text} is made already: {', '.join(fixed)} cannot change it; leave out one or the other")
+        return task
+
+    def run(self, task: Task, *, as_json: bool, dry_run: bool, extra: Callable[[Artefact], None] | None = None) -> None:
+        """Make ``task`` and print its name, or print the plan."""
+        if dry_run:
+            show_plan(self.pipeline.plan(task), as_json=as_json)
+            return
+        artefact = self.pipeline.make(task)
+        if extra is not None:
+            extra(artefact)
+        if as_json:
+            print_json(describe(artefact, self.pipeline.store.path(artefact.record)))
+        else:
+            print(artefact.record.name)
+
+
+def open_session(
+    store: Path | None, experiment: str, assignments: Sequence[str] | None, options: Changes | None = None
+) -> Session:
+    """A session; ``options`` of the command win over ``--set``, which wins over the experiment file."""
+    from koopcli.stages.pipeline import Pipeline
+
+    changes = parse_set(assignments or [])
+    for section, values in (options or {}).items():
+        changes.setdefault(section, {}).update({key: v for key, v in values.items() if v is not None})
+    changes = {section: values for section, values in changes.items() if values}
+    loaded = load_experiment(experiment, changes)
+    console, shelf = open_store(store)
+    return Session(Pipeline(shelf, console), console, loaded, changes)
+
+
+def open_store(store: Path | None) -> tuple[Console, Any]:
+    """The console and the store."""
+    from koopcli.store import Store, store_root
+
+    console = Console()
+    return console, Store(store_root(store), console.warn)
+
+
+def describe(artefact: Artefact, path: Path) -> dict[str, Any]:
+    """The JSON of a making command."""
+    return {
+        "name": artefact.record.name,
+        "path": str(path),
+        "cached": artefact.cached,
+        "seconds": round(artefact.seconds, 3),
+        **artefact.figures,
+    }
+
+
+def print_json(value: object) -> None:
+    """One JSON value on stdout; what is not a finite number becomes null."""
+    print(json.dumps(_finite(value), indent=1, ensure_ascii=False))
+
+
+def show_plan(steps: Sequence[Step], *, as_json: bool) -> None:
+    """The table of a dry run, on stdout."""
+    from koopcli.store.files import size_text
+
+    seconds, size = sum(step.cost.seconds for step in steps), sum(step.cost.bytes for step in steps)
+    if as_json:
+        rows = [{"name": step.name, "action": step.state, **vars(step.cost)} for step in steps]
+        print_json({"dry_run": True, "steps": rows, "seconds": round(seconds, 2), "bytes": round(size)})
+        return
+    table = []
+    for step in steps:
+        made = step.state == "make"
+        cost = (f"{step.cost.seconds:.1f} s", size_text(step.cost.bytes)) if made else ("", "")
+        table.append([step.name, step.state, *cost])
+    table.append(["total, roughly", "", f"{seconds:.1f} s", size_text(size)])
+    show_table(["artefact", "would", "time", "size"], table, title="", file=sys.stdout)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(v) for key, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

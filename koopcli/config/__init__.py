@@ -1,0 +1,1 @@
+"""Settings of the stages, experiment files, and where the shipped data lie."""

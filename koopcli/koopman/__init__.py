@@ -1,0 +1,1 @@
+"""Bases, regression, EDMD, predictors and their scores: pure numerics."""

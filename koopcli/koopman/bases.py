@@ -1,0 +1,130 @@
+"""Bases of observables ψ(x). A new basis is one frozen class and one line in ``BASES``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from koopcli.koopman.orthonormal import OrthonormalPolynomials, orthonormal_polynomials
+from koopcli.records import Array, FloatArray, Packed
+
+
+class Basis(Protocol):
+    """What a lift has to offer."""
+
+    @property
+    def functions(self) -> int:
+        """Number of observables N."""
+
+    @property
+    def constant(self) -> int:
+        """Index of the observable that is one everywhere."""
+
+    @property
+    def state_map(self) -> FloatArray:
+        """C (n_x, N) with x = C ψ(x) exactly: every basis holds the states themselves."""
+
+    def lift(self, x: FloatArray) -> FloatArray:
+        """ψ(x) (n, N) of the states (n, n_x)."""
+
+    def group_moments(self, x: FloatArray, weights: FloatArray) -> FloatArray:
+        """Σ_j weights[j] ψ(x[s, j]) as (n, q, N), for states in groups (n, m, n_x) and weights (m, q)."""
+
+    def pack(self) -> Packed:
+        """The basis as arrays."""
+
+
+@dataclass(frozen=True)
+class TensorPolynomial:
+    """All products p_a(x_1) p_b(x_2) … with each degree at most k: (k + 1)^n_x functions (docs/equations.md 3).
+
+    The factors are orthonormal on the training data, which spans what the monomials span: EDMD does not depend on
+    the choice, its condition number does. The last state's degree runs fastest; the first function is 1.
+    """
+
+    axes: tuple[OrthonormalPolynomials, ...]
+    constant = 0
+
+    @property
+    def functions(self) -> int:
+        """Number of observables."""
+        return int(np.prod([axis.degree + 1 for axis in self.axes]))
+
+    @property
+    def state_map(self) -> FloatArray:
+        """C (n_x, N) with x = C ψ(x): each state is a combination of its own p_0 and p_1."""
+        sizes = [axis.degree + 1 for axis in self.axes]
+        C = np.zeros((len(sizes), self.functions))
+        for i, axis in enumerate(self.axes):
+            C[i, 0] = axis.centre + axis.scale * axis.alpha[0]
+            C[i, int(np.prod(sizes[i + 1 :]))] = axis.scale * axis.beta[1]
+        return C
+
+    def lift(self, x: FloatArray) -> FloatArray:
+        """ψ(x) (n, N) of the states (n, n_x)."""
+        z = np.ones((len(x), 1))
+        for i, axis in enumerate(self.axes):
+            z = (z[:, :, np.newaxis] * axis(x[:, i]).T[:, np.newaxis, :]).reshape(len(x), -1)
+        return z
+
+    def group_moments(self, x: FloatArray, weights: FloatArray) -> FloatArray:
+        """Σ_j weights[j] ψ(x[s, j]) as (n, q, N), for states in groups (n, m, n_x) and weights (m, q).
+
+        The sum over j is one small matrix product for each group, between the leading factors and the weighted last
+        one, so ψ itself is never formed.
+        """
+        n, m, _ = x.shape
+        *leading, last = [axis(x[..., i]) for i, axis in enumerate(self.axes)]  # (degree + 1, n, m) each
+        head = np.ones((1, n, m))
+        for factor in leading:
+            head = (head[:, np.newaxis] * factor).reshape(-1, n, m)
+        tail = (weights.T[:, np.newaxis, np.newaxis, :] * last).reshape(-1, n, m)  # (q · last, n, m)
+        product = np.matmul(head.transpose(1, 0, 2), tail.transpose(1, 2, 0))  # (n, head, q · last)
+        q = weights.shape[1]
+        moments: FloatArray = product.reshape(n, len(head), q, len(last)).transpose(0, 2, 1, 3).reshape(n, q, -1)
+        return moments
+
+    def pack(self) -> Packed:
+        """The recurrence coefficients of each factor."""
+        arrays: dict[str, Array] = {}
+        for i, axis in enumerate(self.axes):
+            arrays[f"{i}/map"] = Array(np.array([axis.centre, axis.scale]), ("centre and scale",), "state")
+            arrays[f"{i}/alpha"] = Array(axis.alpha, ("degree",), "1")
+            arrays[f"{i}/beta"] = Array(axis.beta, ("degree",), "1")
+        return Packed(arrays, {"basis": "tensor", "axes": len(self.axes)})
+
+    @classmethod
+    def unpack(cls, packed: Packed) -> TensorPolynomial:
+        """The inverse of :meth:`pack`."""
+        values = {name: array.values[...] for name, array in packed.arrays.items()}
+        axes = []
+        for i in range(packed.meta["axes"]):
+            centre, scale = values[f"{i}/map"].tolist()
+            axes.append(OrthonormalPolynomials(centre, scale, values[f"{i}/alpha"], values[f"{i}/beta"]))
+        return cls(tuple(axes))
+
+
+def tensor_polynomial(nodes: Sequence[tuple[FloatArray, FloatArray]], order: int) -> TensorPolynomial:
+    """The tensor basis of ``order`` on (nodes, weights) for each state."""
+    return TensorPolynomial(tuple(orthonormal_polynomials(t, w, order) for t, w in nodes))
+
+
+@dataclass(frozen=True)
+class BasisKind:
+    """How a basis is made from the data's marginals and an order, counted beforehand, and restored."""
+
+    make: Callable[[Sequence[tuple[FloatArray, FloatArray]], int], Basis]
+    count: Callable[[int, int], int]
+    unpack: Callable[[Packed], Basis]
+
+
+BASES: dict[str, BasisKind] = {
+    "tensor": BasisKind(
+        make=tensor_polynomial,
+        count=lambda order, states: (order + 1) ** states,
+        unpack=TensorPolynomial.unpack,
+    ),
+}

@@ -1,0 +1,145 @@
+"""The scores of a predictor on test trajectories, one row a trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from koopcli.errors import InvalidValueError
+from koopcli.koopman import metrics
+from koopcli.koopman.predictor import Predictor, response
+from koopcli.records import Array, BoolArray, Channels, FloatArray, Meta, Packed, Trajectories
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Scores of n trajectories: ``rmse``, ``rmse_printed``, ``rmse_relift`` (n,) in percent; ``max_error`` (n, n_x)
+    the largest error of each state; ``in_domain`` (n,) the share of true samples inside the training box;
+    ``diverged`` (n,); ``x0`` (n, n_x). A diverged trajectory keeps its row, and stays out of the figures.
+    """
+
+    x0: FloatArray
+    rmse: FloatArray
+    rmse_printed: FloatArray
+    rmse_relift: FloatArray
+    max_error: FloatArray
+    in_domain: FloatArray
+    diverged: BoolArray
+    steps: int
+    first: int
+    functions: int
+    state_channels: Channels
+
+    def figures(self) -> Meta:
+        """The figures that scripts read (`--json`)."""
+        valid = ~self.diverged
+        with np.errstate(invalid="ignore"):
+            worst = [float(np.max(e[valid], initial=0.0)) for e in self.max_error.T]
+        return {
+            "rmse": metrics.summary(self.rmse[valid]),
+            "rmse_printed": metrics.summary(self.rmse_printed[valid]),
+            "rmse_relift": metrics.summary(self.rmse_relift[valid]),
+            "max_error": dict(zip(self.state_channels.names, worst, strict=True)),
+            "trajectories": len(self.rmse),
+            "steps": self.steps,
+            "diverged": int(self.diverged.sum()),
+            "undefined": int(np.isnan(self.rmse[valid]).sum()),
+            "in_domain_share": float(self.in_domain.mean()),
+            "functions": self.functions,
+        }
+
+    def table(self) -> tuple[list[str], list[list[float]]]:
+        """The per-trajectory table: column names with units, and rows."""
+        states = list(zip(self.state_channels.names, self.state_channels.units, strict=True))
+        header = [f"{name}_0 ({unit})" for name, unit in states]
+        header += ["rmse (%)", "rmse_printed (%)", "rmse_relift (%)"]
+        header += [f"max_error {name} ({unit})" for name, unit in states]
+        header += ["in_domain (1)", "diverged (1)"]
+        columns = [self.x0, self.rmse, self.rmse_printed, self.rmse_relift, self.max_error, self.in_domain]
+        return header, np.column_stack([*columns, self.diverged]).tolist()
+
+    def pack(self) -> Packed:
+        """The evaluation for storage."""
+        units = self.state_channels.unit_text
+        row, per_state = ("trajectory",), ("trajectory", "state")
+        arrays = {
+            "x0": Array(self.x0, per_state, units),
+            "rmse": Array(self.rmse, row, "%"),
+            "rmse_printed": Array(self.rmse_printed, row, "%"),
+            "rmse_relift": Array(self.rmse_relift, row, "%"),
+            "max_error": Array(self.max_error, per_state, units),
+            "in_domain": Array(self.in_domain, row, "1"),
+            "diverged": Array(self.diverged, row, "1"),
+        }
+        meta = {
+            "steps": self.steps,
+            "first": self.first,
+            "functions": self.functions,
+            "state_channels": self.state_channels.pack(),
+        }
+        return Packed(arrays, meta)
+
+    @classmethod
+    def unpack(cls, packed: Packed) -> Evaluation:
+        """The inverse of :meth:`pack`."""
+        meta = dict(packed.meta)
+        channels = Channels.unpack(meta.pop("state_channels"))
+        return cls(**{n: a.values[...] for n, a in packed.arrays.items()}, **meta, state_channels=channels)
+
+
+def evaluate(predictor: Predictor, trajectories: Trajectories, rows: slice, first: int) -> Evaluation:
+    """Score ``predictor`` on the trajectories ``rows``, samples k = ``first`` .. steps.
+
+    Raises ``InvalidValueError`` when states, inputs or sampling period differ from the predictor's.
+    """
+    _check(predictor, trajectories, first)
+    x = np.asarray(trajectories.x[rows])
+    u = np.asarray(trajectories.u[rows])
+    with np.errstate(over="ignore", invalid="ignore"):  # a diverging prediction is a result, not an accident
+        once = response(predictor, predictor.lift(x[:, 0]), u)
+        relift = np.empty_like(once)
+        relift[:, 0] = once[:, 0]
+        for k in range(trajectories.steps):
+            relift[:, k + 1] = predictor.step(relift[:, k], u[:, k])
+        scored = slice(first, None)
+        return Evaluation(
+            x0=x[:, 0],
+            rmse=metrics.rmse(once[:, scored], x[:, scored]),
+            rmse_printed=metrics.rmse_printed(once[:, scored], x[:, scored]),
+            rmse_relift=metrics.rmse(relift[:, scored], x[:, scored]),
+            max_error=np.abs(once[:, scored] - x[:, scored]).max(axis=1),
+            in_domain=metrics.in_domain(x[:, scored], predictor.domain),
+            diverged=metrics.diverged(once[:, scored], predictor.domain),
+            steps=trajectories.steps,
+            first=first,
+            functions=predictor.functions,
+            state_channels=predictor.state_channels,
+        )
+
+
+def join(parts: Sequence[Evaluation]) -> Evaluation:
+    """One evaluation from those of consecutive rows."""
+    one = parts[0]
+    return Evaluation(
+        **{name: np.concatenate([getattr(p, name) for p in parts]) for name in one.pack().arrays},
+        steps=one.steps,
+        first=one.first,
+        functions=one.functions,
+        state_channels=one.state_channels,
+    )
+
+
+def _check(predictor: Predictor, trajectories: Trajectories, first: int) -> None:
+    if (predictor.state_channels, predictor.input_channels) != (
+        trajectories.state_channels,
+        trajectories.input_channels,
+    ):
+        raise InvalidValueError("the trajectories and the predictor have different states or inputs")
+    if predictor.dt != trajectories.dt:
+        raise InvalidValueError(
+            f"the predictor steps by {predictor.dt} s, the trajectories by {trajectories.dt} s: simulate with --dt"
+        )
+    if not 0 <= first <= trajectories.steps:
+        raise InvalidValueError(f"'evaluate.first' must be at most {trajectories.steps} steps, got {first}")

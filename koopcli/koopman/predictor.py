@@ -1,0 +1,132 @@
+"""The linear predictor in lifted states, whichever method made it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from koopcli.errors import InvalidValueError
+from koopcli.koopman.bases import BASES, Basis
+from koopcli.records import Array, Channels, FloatArray, Meta, Packed
+
+
+@dataclass(frozen=True)
+class Predictor:
+    """z⁺ = A z + B u, x̂ = C z with z = ψ(x): eqs. (4.1), (4.2) of docs/equations.md.
+
+    ``A`` (N, N), ``B`` (N, n_u), ``C`` (n_x, N); ``dt`` in s; ``domain`` (2, n_x) the smallest and largest training
+    state; ``plant`` what was identified, as JSON; ``rank`` and ``condition`` of the regression.
+    """
+
+    basis: Basis
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    dt: float
+    domain: FloatArray
+    state_channels: Channels
+    input_channels: Channels
+    rank: int
+    condition: float
+    spectral_radius: float
+    plant: Meta = field(default_factory=dict)
+
+    @property
+    def functions(self) -> int:
+        """Dimension N of the lifted state."""
+        return len(self.A)
+
+    def lift(self, x: FloatArray) -> FloatArray:
+        """The lifted state z (..., N) of ``x`` (..., n_x)."""
+        x = np.asarray(x, dtype=float)
+        return self.basis.lift(x.reshape(-1, x.shape[-1])).reshape(*x.shape[:-1], self.functions)
+
+    def predict(self, x0: FloatArray, u: FloatArray | None = None, steps: int | None = None) -> FloatArray:
+        """The predicted states (..., steps+1, n_x), lifted once at ``x0`` (..., n_x).
+
+        ``u`` (..., steps, n_u) acts from sample k to k+1; without it the input is zero for ``steps`` steps.
+        Raises ``InvalidValueError`` for shapes that do not fit.
+        """
+        x0 = np.asarray(x0, dtype=float)
+        if u is None:
+            if steps is None:
+                raise InvalidValueError("predict needs the inputs u or the number of steps")
+            u = np.zeros((*x0.shape[:-1], steps, len(self.input_channels)))
+        u = np.asarray(u, dtype=float)
+        wanted = (len(self.state_channels), len(self.input_channels), x0.shape[:-1])
+        if (x0.shape[-1], u.shape[-1], u.shape[:-2]) != wanted or steps not in (None, u.shape[-2]):
+            raise InvalidValueError(
+                f"x0 {x0.shape} and u {u.shape} do not fit a predictor of {wanted[0]} states and {wanted[1]} inputs"
+            )
+        batch = (int(np.prod(x0.shape[:-1])), u.shape[-2])
+        return response(self, self.lift(x0).reshape(batch[0], -1), u.reshape(*batch, -1)).reshape(
+            *x0.shape[:-1], batch[1] + 1, x0.shape[-1]
+        )
+
+    def step(self, x: FloatArray, u: FloatArray) -> FloatArray:
+        """One step from the states ``x`` (n, n_x) lifted afresh, under ``u`` (n, n_u)."""
+        return self.basis.lift(x) @ (self.C @ self.A).T + u @ (self.C @ self.B).T
+
+    def pack(self) -> Packed:
+        """The predictor for storage."""
+        basis = self.basis.pack()
+        state = self.state_channels.unit_text
+        arrays = {
+            "A": Array(self.A, ("lifted", "lifted"), "1"),
+            "B": Array(self.B, ("lifted", "input"), "1/N"),
+            "C": Array(self.C, ("state", "lifted"), state),
+            "domain": Array(self.domain, ("lower and upper", "state"), state),
+            **{f"basis/{name}": array for name, array in basis.arrays.items()},
+        }
+        meta = {
+            "dt": self.dt,
+            "rank": self.rank,
+            "condition": self.condition,
+            "spectral_radius": self.spectral_radius,
+            "plant": self.plant,
+            "basis": basis.meta,
+            "state_channels": self.state_channels.pack(),
+            "input_channels": self.input_channels.pack(),
+        }
+        return Packed(arrays, meta)
+
+    @classmethod
+    def unpack(cls, packed: Packed) -> Predictor:
+        """The inverse of :meth:`pack`."""
+        meta, arrays = packed.meta, packed.arrays
+        parts = {name.removeprefix("basis/"): a for name, a in arrays.items() if name.startswith("basis/")}
+        return cls(
+            basis=BASES[meta["basis"]["basis"]].unpack(Packed(parts, meta["basis"])),
+            A=arrays["A"].values[...],
+            B=arrays["B"].values[...],
+            C=arrays["C"].values[...],
+            dt=meta["dt"],
+            domain=arrays["domain"].values[...],
+            state_channels=Channels.unpack(meta["state_channels"]),
+            input_channels=Channels.unpack(meta["input_channels"]),
+            rank=meta["rank"],
+            condition=meta["condition"],
+            spectral_radius=meta["spectral_radius"],
+            plant=meta["plant"],
+        )
+
+
+def response(predictor: Predictor, z0: FloatArray, u: FloatArray) -> FloatArray:
+    """x̂_k = C A^k z_0 + Σ_i C A^(k-1-i) B u_i (4.3) as (n, steps+1, n_x), for ``z0`` (n, N), ``u`` (n, steps, n_u).
+
+    Only the n_x rows of C A^k are ever formed; the lifted state is not rolled.
+    """
+    n, steps, n_u = u.shape
+    n_x = len(predictor.C)
+    observed = np.empty((steps + 1, n_x, predictor.functions))  # C A^k
+    observed[0] = predictor.C
+    for k in range(steps):
+        observed[k + 1] = observed[k] @ predictor.A
+    x = (z0 @ observed.reshape(-1, predictor.functions).T).reshape(n, steps + 1, n_x)
+    markov = observed[:steps] @ predictor.B  # C A^k B
+    forced = np.zeros((steps, n_u, steps, n_x))  # block Toeplitz: input i to sample k + 1
+    for i in range(steps):
+        forced[i, :, i:] = markov[: steps - i].transpose(2, 0, 1)
+    x[:, 1:] += (u.reshape(n, -1) @ forced.reshape(steps * n_u, -1)).reshape(n, steps, n_x)
+    return x

@@ -1,0 +1,216 @@
+"""The records that carry data between stages: arrays with named axes and units, and nothing about files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from koopcli.errors import InvalidValueError
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+Meta = dict[str, Any]  # what JSON can hold
+
+
+class Blocks(Protocol):
+    """An array in memory or on disk that is read by slices of its first axis."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The lengths of the axes."""
+
+    @property
+    def dtype(self) -> Any:
+        """The numpy type."""
+
+    def __getitem__(self, rows: Any, /) -> Any: ...
+
+
+@dataclass(frozen=True)
+class Array:
+    """Values with one name per axis and the unit (or one unit per column of the last axis)."""
+
+    values: Blocks
+    axes: tuple[str, ...]
+    units: str
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A record taken apart for storage: named arrays, and small facts as JSON."""
+
+    arrays: Mapping[str, Array]
+    meta: Meta = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Channels:
+    """Names and units of the components of a state or input vector."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def unit_text(self) -> str:
+        """The units as one text, for a stored array."""
+        return ", ".join(self.units)
+
+    def pack(self) -> Meta:
+        """The channels as JSON."""
+        return {"names": list(self.names), "units": list(self.units)}
+
+    @classmethod
+    def unpack(cls, meta: Mapping[str, list[str]]) -> Channels:
+        """The inverse of :meth:`pack`."""
+        return cls(tuple(meta["names"]), tuple(meta["units"]))
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Initial states and inputs.
+
+    ``factors``: per state the values of a grid, or empty; then ``states`` (n, n_x) holds the initial states.
+    ``inputs`` (rows, held steps, n_u) in N. ``crossed``: every state meets every input row; otherwise row i goes
+    with state i. A single input step is held over the whole trajectory.
+    """
+
+    factors: tuple[FloatArray, ...]
+    states: FloatArray
+    inputs: FloatArray
+    crossed: bool
+    state_channels: Channels
+    input_channels: Channels
+
+    @property
+    def x0(self) -> FloatArray:
+        """Initial states (n, n_x); a grid runs with its last factor fastest."""
+        if not self.factors:
+            return self.states
+        return np.stack(np.meshgrid(*self.factors, indexing="ij"), axis=-1).reshape(-1, len(self.factors))
+
+    @property
+    def product(self) -> tuple[int, int] | None:
+        """(states, input rows) if every state meets every input row."""
+        return (len(self.x0), len(self.inputs)) if self.crossed else None
+
+    def expand(self, steps: int) -> tuple[FloatArray, FloatArray]:
+        """Initial states (n, n_x) and inputs (n, steps, n_u) of each trajectory, state-major when crossed."""
+        x0, u = self.x0, self.inputs
+        if u.shape[1] == 1:
+            u = np.repeat(u, steps, axis=1)
+        elif u.shape[1] < steps:
+            raise InvalidValueError(
+                f"the sample holds inputs for {u.shape[1]} steps, {steps} were asked for: sample again with more"
+            )
+        u = u[:, :steps]
+        if self.crossed:
+            return np.repeat(x0, len(u), axis=0), np.tile(u, (len(x0), 1, 1))
+        return x0, u
+
+    def pack(self) -> Packed:
+        """The sample for storage; a grid is stored by its factors."""
+        units = self.state_channels.units
+        arrays = {
+            f"factors/{name}": Array(values, (name,), unit)
+            for name, unit, values in zip(self.state_channels.names, units, self.factors, strict=False)
+        }
+        if not self.factors:
+            arrays["states"] = Array(self.states, ("trajectory", "state"), self.state_channels.unit_text)
+        arrays["inputs"] = Array(self.inputs, ("input row", "step", "input"), self.input_channels.unit_text)
+        meta = {
+            "crossed": self.crossed,
+            "state_channels": self.state_channels.pack(),
+            "input_channels": self.input_channels.pack(),
+        }
+        return Packed(arrays, meta)
+
+    @classmethod
+    def unpack(cls, packed: Packed) -> Sample:
+        """The inverse of :meth:`pack`."""
+        channels = Channels.unpack(packed.meta["state_channels"])
+        values = {name: array.values[...] for name, array in packed.arrays.items()}
+        factors = tuple(values[f"factors/{n}"] for n in channels.names if f"factors/{n}" in values)
+        return cls(
+            factors=factors,
+            states=values.get("states", np.empty((0, len(channels)))),
+            inputs=values["inputs"],
+            crossed=packed.meta["crossed"],
+            state_channels=channels,
+            input_channels=Channels.unpack(packed.meta["input_channels"]),
+        )
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """Sampled trajectories: ``x`` (n, steps+1, n_x), ``u`` (n, steps, n_u) with u_k acting from k to k+1, ``dt`` in s.
+
+    ``product = (states, input rows)`` says that the trajectories are every state with every input row, state-major.
+    ``plant`` tells how they were made, as JSON. The arrays may live on disk; they are read in blocks.
+    """
+
+    x: Blocks
+    u: Blocks
+    dt: float
+    state_channels: Channels
+    input_channels: Channels
+    product: tuple[int, int] | None = None
+    plant: Meta = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        n, samples, n_x = self.x.shape
+        if self.u.shape[:2] != (n, samples - 1) or n_x != len(self.state_channels):
+            raise InvalidValueError(f"trajectories of shape x {self.x.shape}, u {self.u.shape} do not fit together")
+        if self.product is not None and self.product[0] * self.product[1] != n:
+            raise InvalidValueError(f"{n} trajectories are not a product of {self.product[0]} × {self.product[1]}")
+
+    def __len__(self) -> int:
+        return self.x.shape[0]
+
+    @property
+    def steps(self) -> int:
+        """Steps of each trajectory."""
+        return self.x.shape[1] - 1
+
+    def transitions(self, rows: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+        """One-step pairs (x, u, x⁺) in blocks of about ``rows``; no pair spans two trajectories."""
+        block = max(1, rows // max(1, self.steps))
+        n_x, n_u = self.x.shape[2], self.u.shape[2]
+        for start in range(0, len(self), block):
+            x, u = self.x[start : start + block], self.u[start : start + block]
+            yield x[:, :-1].reshape(-1, n_x), u.reshape(-1, n_u), x[:, 1:].reshape(-1, n_x)
+
+    def pack(self) -> Packed:
+        """The trajectories for storage."""
+        arrays = {
+            "x": Array(self.x, ("trajectory", "sample", "state"), self.state_channels.unit_text),
+            "u": Array(self.u, ("trajectory", "step", "input"), self.input_channels.unit_text),
+        }
+        meta = {
+            "dt": self.dt,
+            "product": list(self.product) if self.product else None,
+            "plant": self.plant,
+            "state_channels": self.state_channels.pack(),
+            "input_channels": self.input_channels.pack(),
+        }
+        return Packed(arrays, meta)
+
+    @classmethod
+    def unpack(cls, packed: Packed) -> Trajectories:
+        """The inverse of :meth:`pack`; ``x`` and ``u`` stay where they are."""
+        product = packed.meta["product"]
+        return cls(
+            x=packed.arrays["x"].values,
+            u=packed.arrays["u"].values,
+            dt=packed.meta["dt"],
+            state_channels=Channels.unpack(packed.meta["state_channels"]),
+            input_channels=Channels.unpack(packed.meta["input_channels"]),
+            product=(product[0], product[1]) if product else None,
+            plant=packed.meta["plant"],
+        )

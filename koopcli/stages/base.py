@@ -1,0 +1,101 @@
+"""What a stage is, and what a task is: a stage with its settings and the tasks that make its inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from koopcli.errors import UnknownNameError
+from koopcli.progress import Progress
+from koopcli.records import Meta, Packed
+
+Inputs = Mapping[str, Any]  # role -> record
+
+
+class Reporter(Protocol):
+    """Where a stage speaks to the user; the command line implements it, a test may too."""
+
+    def note(self, text: str) -> None:
+        """Say something worth knowing."""
+
+    def warn(self, text: str) -> None:
+        """Say something that may be wrong."""
+
+    def progress(self, label: str) -> AbstractContextManager[Progress]:
+        """A progress display for the time of a ``with``."""
+
+
+class Chunks(Protocol):
+    """Work in chunks, each committed as it is done; those already there are not computed again."""
+
+    def __call__(self, count: int, size: int, compute: Callable[[slice], Packed]) -> list[Packed]:
+        """The results of ``compute`` on consecutive slices of ``range(count)`` of length ``size``."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a running stage may use besides its settings and inputs."""
+
+    progress: Progress
+    warn: Callable[[str], None]
+    chunks: Chunks
+
+
+@dataclass(frozen=True)
+class Cost:
+    """A rough estimate: seconds on one core and bytes stored."""
+
+    seconds: float
+    bytes: float
+
+
+@dataclass(frozen=True)
+class Task:
+    """A stage with its settings and its inputs by role. ``key`` fixes an artefact that was named instead."""
+
+    stage: str
+    settings: Any
+    inputs: tuple[tuple[str, Task], ...] = ()
+    key: str | None = None
+
+    def find(self, stage: str) -> Task | None:
+        """The nearest task of ``stage`` upstream, this one included, if it is known."""
+        return next((task for task in self.upstream() if task.stage == stage), None)
+
+    def ancestor(self, stage: str) -> Task:
+        """The same, where nothing can be done without it. Raises ``UnknownNameError`` when its record is gone."""
+        found = self.find(stage)
+        if found is None:
+            name = f"{self.stage}/{(self.key or '')[:12]}"
+            raise UnknownNameError(f"the {stage} stage behind {name} is no longer in the store: make it afresh")
+        return found
+
+    def upstream(self) -> Iterator[Task]:
+        """This task and all before it, nearest first."""
+        yield self
+        for _, task in self.inputs:
+            yield from task.upstream()
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage. Changing what ``run`` computes means raising ``version``: it is part of every key."""
+
+    name: str
+    version: int
+    settings: Callable[[Mapping[str, Any]], Any]
+    """Settings from the JSON of a record."""
+    run: Callable[[Any, Inputs, Context], Any]
+    """(settings, inputs, context) -> record, which has ``pack()``."""
+    unpack: Callable[[Packed], Any]
+    """The record from storage."""
+    figures: Callable[[Any], Meta]
+    """The record's figures for ``--json`` and the lines on stderr."""
+    describe: Callable[[Meta], str]
+    """Those figures in a few words."""
+    check: Callable[[Task], None]
+    """Refuse, before anything upstream is made, a task that cannot work."""
+    estimate: Callable[[Task], Cost]
+    """What making the task will cost, its inputs aside."""

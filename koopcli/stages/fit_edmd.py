@@ -1,0 +1,83 @@
+"""Stage ``fit-edmd``: a predictor from trajectories by EDMD."""
+
+from __future__ import annotations
+
+from koopcli.checks import build
+from koopcli.config.settings import FitEdmd, GridSample
+from koopcli.errors import InvalidValueError
+from koopcli.koopman import edmd
+from koopcli.koopman.bases import BASES
+from koopcli.koopman.predictor import Predictor
+from koopcli.records import Meta, Trajectories
+from koopcli.stages.base import Context, Cost, Inputs, Stage, Task
+from koopcli.store.files import size_text
+from koopcli.vehicles.single_track import ForceInput
+
+FUNCTIONS_LIMIT = 4096
+
+
+def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
+    trajectories: Trajectories = inputs["trajectories"]
+    basis = edmd.basis_from_data(trajectories, settings.basis, settings.order)
+    predictor = edmd.fit(trajectories, basis, context.progress)
+    unknowns = predictor.functions + len(predictor.input_channels)
+    if predictor.rank < unknowns:
+        context.warn(
+            f"the data determine {predictor.rank} of {unknowns} directions (condition {predictor.condition:.1e}); "
+            "the others were set to zero: sample more states or inputs, or lower the order"
+        )
+    return predictor
+
+
+def _figures(predictor: Predictor) -> Meta:
+    return {
+        "functions": predictor.functions,
+        "rank": predictor.rank,
+        "condition": predictor.condition,
+        "spectral_radius": predictor.spectral_radius,
+    }
+
+
+def _functions(task: Task) -> int:
+    return BASES[task.settings.basis].count(task.settings.order, len(ForceInput.states))
+
+
+def _check(task: Task) -> None:
+    order, functions = task.settings.order, _functions(task)
+    if functions > FUNCTIONS_LIMIT:
+        raise InvalidValueError(
+            f"'fit-edmd.order' {order} needs {functions:,} functions and {size_text(8.0 * functions**2)} for A alone; "
+            f"the limit is {FUNCTIONS_LIMIT:,} functions: lower the order"
+        )
+    sample = task.find("sample")
+    if sample is not None and isinstance(sample.settings, GridSample) and order >= sample.settings.count:
+        count = sample.settings.count
+        raise InvalidValueError(
+            f"'fit-edmd.order' {order} is too high for {count} values per state, which carry orders up to "
+            f"{count - 1}: lower the order or raise sample.count"
+        )
+
+
+def _estimate(task: Task) -> Cost:
+    N = _functions(task)
+    sample, plant = task.ancestor("sample").settings, task.ancestor("simulate").settings
+    samples = sample.trajectories * plant.steps
+    crossed = isinstance(sample, GridSample) and plant.steps == 1
+    states = samples // (len(sample.levels) * sample.columns) if crossed else 2 * samples
+    return Cost(1e-6 * samples + 5e-11 * states * N**2 + 1.5e-9 * N**3, 8.0 * N**2)
+
+
+STAGE = Stage(
+    name="fit-edmd",
+    version=1,
+    settings=lambda values: build(FitEdmd, values),
+    run=_run,
+    unpack=Predictor.unpack,
+    figures=_figures,
+    describe=lambda f: (
+        f"{f['functions']} functions, rank {f['rank']}, condition {f['condition']:.2g}, "
+        f"spectral radius {f['spectral_radius']:.6f}"
+    ),
+    check=_check,
+    estimate=_estimate,
+)

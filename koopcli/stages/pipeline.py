@@ -1,0 +1,220 @@
+"""Make a task or find it made: keys from recipes, hits without locks, misses under one, damage rebuilt."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+from koopcli.errors import DamagedArtefactError
+from koopcli.records import Packed
+from koopcli.stages.base import Context, Cost, Reporter, Stage, Task
+from koopcli.stages.registry import STAGES
+from koopcli.store import Record, Store
+from koopcli.store.identity import SCHEMA, key_of, plain
+from koopcli.store.provenance import provenance
+
+
+@dataclass(frozen=True)
+class Artefact:
+    """A made or found artefact: its ``record`` in the store and its content, verified."""
+
+    record: Record
+    content: Any
+    cached: bool
+    seconds: float
+
+    @property
+    def stage(self) -> Stage:
+        """The stage that made it."""
+        return STAGES[self.record.stage]
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """The stage's figures of the content."""
+        return self.stage.figures(self.content)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of a dry run: ``state`` is "reuse" or "make"."""
+
+    task: Task
+    state: str
+    name: str
+    cost: Cost
+
+
+class Pipeline:
+    """Runs tasks against a store, telling the ``reporter`` what was made and what was reused."""
+
+    def __init__(self, store: Store, reporter: Reporter) -> None:
+        self.store = store
+        self.reporter = reporter
+        self._records: dict[Task, Record] = {}
+        self._announced: set[str] = set()
+
+    def make(self, task: Task) -> Artefact:
+        """The artefact of ``task``, from the store where possible; what is missing upstream is made first."""
+        self._check(task)
+        start = time.perf_counter()
+        record, content, cached = self._obtain(task)
+        return Artefact(record, content, cached, time.perf_counter() - start)
+
+    def plan(self, task: Task) -> list[Step]:
+        """What :meth:`make` would reuse and make, inputs first, without making anything."""
+        steps: dict[Task, Step] = {}
+
+        def visit(step: Task) -> None:
+            record = self._known(step)
+            if record is not None and self.store.has_object(record):
+                steps[step] = Step(step, "reuse", record.name, Cost(0, 0))
+                return
+            for _, upstream in step.inputs:
+                visit(upstream)
+            steps[step] = Step(step, "make", f"{step.stage}/…", STAGES[step.stage].estimate(step))
+
+        self._check(task)
+        visit(task)
+        return list(steps.values())
+
+    def named(self, text: str) -> Task:
+        """The task of the artefact named ``text``, with its inputs as far as their records are known."""
+        return self._task(self.store.find(text))
+
+    def _check(self, task: Task) -> None:
+        for step in task.upstream():
+            if step.key is None:
+                STAGES[step.stage].check(step)
+
+    def _task(self, record: Record) -> Task:
+        settings = STAGES[record.stage].settings(record.recipe["settings"])
+        inputs = []
+        for role, name in record.lineage.items():
+            stage, _, key = name.partition("/")
+            upstream = self.store.record(stage, key)
+            if upstream is not None:
+                inputs.append((role, self._task(upstream)))
+        task = Task(record.stage, settings, tuple(inputs), record.key)
+        self._records[task] = record
+        return task
+
+    def _known(self, task: Task) -> Record | None:
+        """The record of ``task`` if it was ever made, found without reading or making anything."""
+        if task in self._records:
+            return self._records[task]
+        if task.key is not None:
+            return self.store.record(task.stage, task.key)
+        inputs = {}
+        for role, upstream in task.inputs:
+            record = self._known(upstream)
+            if record is None:
+                return None
+            inputs[role] = record
+        found = self.store.record(task.stage, key_of(_recipe(task, inputs)))
+        if found is not None:
+            self._records[task] = found
+        return found
+
+    def _obtain(self, task: Task) -> tuple[Record, Any, bool]:
+        """Record, content, and whether it was there already."""
+        record = self._known(task)
+        damaged = False
+        if record is not None and self.store.has_object(record):
+            try:
+                content = STAGES[task.stage].unpack(self.store.read(record))
+            except DamagedArtefactError as error:
+                self.reporter.warn(f"{error}; it is made again")
+                damaged = True
+            else:
+                self._announce(task, record, None)
+                return record, content, True
+        elif record is not None and task.key is not None:
+            self.reporter.warn(f"the object of {record.name} is missing; it is made again")
+        self._records.pop(task, None)
+        if task.key is not None:
+            self._rebuildable(task, record)
+        return self._build(task, damaged)
+
+    def _build(self, task: Task, damaged: bool) -> tuple[Record, Any, bool]:
+        """Make ``task`` under its lock, unless another process has just done so."""
+        stage = STAGES[task.stage]
+        inputs: dict[str, tuple[Record, Any]] = {}
+        for role, upstream in task.inputs:
+            record, content, _ = self._obtain(upstream)
+            inputs[role] = (record, content)
+        recipe = _recipe(task, {role: record for role, (record, _) in inputs.items()})
+        key = key_of(recipe)
+        name = f"{task.stage}/{key[:12]}"
+        with self.store.lock(key, name):
+            there = self.store.record(task.stage, key)
+            if there is not None and self.store.has_object(there) and not damaged:
+                content = stage.unpack(self.store.read(there))
+                self._announce(task, there, None)
+                return there, content, True
+            start = time.perf_counter()
+            parts = self.store.parts(key)
+            with ExitStack() as stack:
+                progress = stack.enter_context(self.reporter.progress(f"{stage.name} {name.partition('/')[2]}"))
+                chunks = _Chunks(parts, progress, self.reporter.note)
+                context = Context(progress, self.reporter.warn, chunks)
+                content = stage.run(task.settings, {role: content for role, (_, content) in inputs.items()}, context)
+            seconds = time.perf_counter() - start
+            lineage = {role: f"{record.stage}/{record.key}" for role, (record, _) in inputs.items()}
+            made = self.store.commit(recipe, lineage, content.pack(), provenance(seconds))
+            parts.clear()
+        self._records[task] = made
+        self._announce(task, made, f"made in {seconds:.1f} s: {stage.describe(stage.figures(content))}")
+        return made, content, False
+
+    def _rebuildable(self, task: Task, record: Record | None) -> None:
+        """Refuse to replace a named artefact by something that today's code would not give the same key."""
+        inputs = {role: self._known(upstream) for role, upstream in task.inputs}
+        known = {role: found for role, found in inputs.items() if found is not None}
+        complete = record is not None and set(known) == set(record.lineage)
+        if not complete or key_of(_recipe(task, known)) != task.key:
+            raise DamagedArtefactError(
+                f"{task.stage}/{(task.key or '')[:12]} is damaged and cannot be made again: its inputs are gone or it "
+                "was made by another version; run its command afresh"
+            )
+
+    def _announce(self, task: Task, record: Record, made: str | None) -> None:
+        if record.name not in self._announced:
+            self._announced.add(record.name)
+            self.reporter.note(f"{record.name:<24} {made or 'reused'}")
+
+
+@dataclass
+class _Chunks:
+    """Chunked work of one artefact; see :class:`koopcli.stages.base.Chunks`."""
+
+    parts: Any
+    progress: Callable[[int, int], None]
+    note: Callable[[str], None]
+
+    def __call__(self, count: int, size: int, compute: Callable[[slice], Packed]) -> list[Packed]:
+        """The packed results of all slices of ``range(count)``, in order."""
+        slices = [slice(start, min(start + size, count)) for start in range(0, count, size)]
+        results = [self.parts.read(i) for i in range(len(slices))]
+        there = sum(result is not None for result in results)
+        if there:
+            self.note(f"{there} of {len(slices)} chunks were already there")
+        for i, rows in enumerate(slices):
+            if results[i] is None:
+                results[i] = compute(rows)
+                if len(slices) > 1:
+                    self.parts.commit(i, results[i])
+            self.progress(rows.stop, count)
+        return results
+
+
+def _recipe(task: Task, inputs: Mapping[str, Record]) -> dict[str, Any]:
+    return {
+        "schema": SCHEMA,
+        "stage": task.stage,
+        "version": STAGES[task.stage].version,
+        "settings": plain(task.settings),
+        "inputs": {role: record.data for role, record in inputs.items()},
+    }

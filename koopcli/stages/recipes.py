@@ -1,0 +1,74 @@
+"""From an experiment to tasks: which stage feeds which."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from koopcli.config.experiment import Experiment
+from koopcli.config.settings import BoxSample, GridSample, ImageFormat, Plot, Series
+from koopcli.errors import UnknownNameError
+from koopcli.stages.base import Task
+
+FITS = ("fit-edmd",)
+
+
+def sample(settings: GridSample | BoxSample) -> Task:
+    """The sample of ``settings``."""
+    return Task("sample", settings.settled() if isinstance(settings, BoxSample) else settings)
+
+
+def simulation(experiment: Experiment, of: Task | None = None) -> Task:
+    """Training trajectories, from the experiment's sample or the one given."""
+    start = of or sample(experiment.sample)
+    steps = experiment.simulate.steps
+    if steps is None:
+        steps = experiment.sample.horizon if of is None else start.settings.horizon
+    return Task("simulate", replace(experiment.simulate, steps=steps), (("sample", start),))
+
+
+def fit_edmd(experiment: Experiment, of: Task | None = None) -> Task:
+    """The EDMD predictor, from the experiment's training set or the trajectories given."""
+    return Task("fit-edmd", experiment.fit_edmd, (("trajectories", of or simulation(experiment)),))
+
+
+def test_set(experiment: Experiment, predictor: Task) -> Task:
+    """The test trajectories of ``predictor``: its own plant, vehicle and period, from the experiment's test states."""
+    plant = predictor.ancestor("simulate").settings
+    return Task("simulate", replace(plant, steps=experiment.test.steps), (("sample", sample(experiment.test)),))
+
+
+def evaluation(experiment: Experiment, of: Task | None = None, on: Task | None = None) -> Task:
+    """The evaluation of a predictor on its test set or the trajectories given."""
+    predictor = of or fit_edmd(experiment)
+    trajectories = on or test_set(experiment, predictor)
+    return Task("evaluate", experiment.evaluate, (("predictor", predictor), ("trajectories", trajectories)))
+
+
+def with_order(experiment: Experiment, order: int) -> Experiment:
+    """The experiment with another basis order."""
+    return replace(experiment, fit_edmd=replace(experiment.fit_edmd, order=order))
+
+
+def order_sweep(experiment: Experiment) -> list[Task]:
+    """One evaluation for each order of the experiment's sweep."""
+    return [evaluation(with_order(experiment, order)) for order in experiment.reproduce.orders]
+
+
+def orders_figure(evaluations: Sequence[Task], image: ImageFormat) -> Task:
+    """The figure of errors against order, from evaluations of EDMD predictors."""
+    settings = Plot("orders", image, tuple(_series(task) for task in evaluations))
+    return Task("plot", settings, tuple((str(i), task) for i, task in enumerate(evaluations)))
+
+
+def _series(task: Task) -> Series:
+    if task.stage != "evaluate":
+        raise UnknownNameError(f"the figure 'orders' takes evaluations, not an artefact of stage {task.stage}")
+    inputs = dict(task.inputs)
+    training, test = (
+        inputs["predictor"].ancestor("sample").settings,
+        inputs["trajectories"].ancestor("sample").settings,
+    )
+    draw = f"{training.draw} {training.seed}" if isinstance(training, GridSample) else "box"
+    excitation = test.excitation if isinstance(test, BoxSample) else "grid"
+    return Series(inputs["predictor"].ancestor("fit-edmd").settings.order, draw, excitation)

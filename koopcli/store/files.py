@@ -1,0 +1,127 @@
+"""Durable files: write beside, fsync, rename, fsync of the folder. Nothing is ever written under its final name."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import secrets
+import shutil
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from koopcli.errors import StorageError
+
+HOUR, DAY = 3600.0, 86400.0
+
+
+@contextmanager
+def storage_errors(path: Path, needed: int = 0) -> Iterator[None]:
+    """Turn an ``OSError`` at ``path`` into one line that says what failed, what was needed and what is free."""
+    try:
+        yield
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error).splitlines()[0]
+        text = f"cannot write to the store at {path}: {reason}"
+        if needed or error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+            text += f" ({size_text(needed)} needed, {size_text(_free(path))} free)"
+        raise StorageError(f"{text}; free some space or choose another folder with --store") from error
+
+
+def publish(target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path], None], temporary: Path) -> Path:
+    """Put a file at ``target``: whole or not at all, and on the disk when this returns.
+
+    ``fill`` is the content, or writes it to the path it is given; ``target`` is the path, or finds it from the
+    finished file; ``temporary`` is a folder on the same file system. Returns the path.
+    """
+    make_folder(temporary)
+    beside = temporary / f"{os.getpid()}-{secrets.token_hex(8)}@{socket.gethostname()}"
+    try:
+        if isinstance(fill, bytes):
+            _write_new(beside, fill)
+        else:
+            fill(beside)
+            _fsync(beside)
+        final = target if isinstance(target, Path) else target(beside)
+        make_folder(final.parent)
+        os.replace(beside, final)
+    except BaseException:
+        with suppress(OSError):
+            beside.unlink(missing_ok=True)
+        raise
+    _fsync(final.parent)
+    return final
+
+
+def sha256_file(path: Path) -> str:
+    """The digest of a file, read in pieces."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def make_folder(path: Path) -> None:
+    """Create ``path`` and its parents durably."""
+    if path.is_dir():
+        return
+    make_folder(path.parent)
+    path.mkdir(exist_ok=True)
+    _fsync(path.parent)
+
+
+def sweep(temporary: Path, now: float) -> None:
+    """Remove what dead processes left: after a day, or after an hour when their process is known to be gone."""
+    for path in temporary.iterdir():
+        with suppress(OSError):
+            age = now - path.stat().st_mtime
+            if age > DAY or (age > HOUR and _orphaned(path.name)):
+                path.unlink()
+
+
+def size_text(size: float) -> str:
+    """Bytes for people: 13.8 MB."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000:
+            return f"{size:.0f} {unit}" if unit == "B" else f"{size:.1f} {unit}"
+        size /= 1000
+    return f"{size:.1f} TB"
+
+
+def _write_new(path: Path, content: bytes) -> None:
+    descriptor = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
+    try:
+        view = memoryview(content)
+        while view:
+            view = view[os.write(descriptor, view) :]
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _fsync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _orphaned(name: str) -> bool:
+    process, _, host = name.partition("@")
+    pid = process.partition("-")[0]
+    if host != socket.gethostname() or not pid.isdigit():
+        return False
+    try:
+        os.kill(int(pid), 0)
+    except ProcessLookupError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
+def _free(path: Path) -> int:
+    while not path.exists() and path != path.parent:
+        path = path.parent
+    return shutil.disk_usage(path).free

@@ -1,0 +1,86 @@
+"""The record of an artefact: recipe, object and provenance as JSON people can read, guarded by its own check."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from koopcli.errors import NewerFormatError
+from koopcli.store.identity import SCHEMA, canonical, key_of
+
+SHORT = 12  # digits of a key in a name
+
+
+class BadRecordError(Exception):
+    """A record that does not read, or does not match its own check or key."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """What is known of one artefact; writing it is what commits the artefact.
+
+    ``recipe`` {schema, stage, version, settings, inputs: {role: data digest}} hashes to ``key``; ``lineage`` names
+    the inputs as "stage/key"; ``object`` is the sha256 of the stored bytes, ``size`` their number, ``data`` the
+    digest of the logical content.
+    """
+
+    recipe: Mapping[str, Any]
+    lineage: Mapping[str, str]
+    object: str
+    size: int
+    data: str
+    provenance: Mapping[str, Any]
+
+    @property
+    def key(self) -> str:
+        """The key of the recipe."""
+        return key_of(self.recipe)
+
+    @property
+    def stage(self) -> str:
+        """The stage that made it."""
+        return str(self.recipe["stage"])
+
+    @property
+    def name(self) -> str:
+        """What commands print and take."""
+        return f"{self.stage}/{self.key[:SHORT]}"
+
+    def to_json(self) -> bytes:
+        """The record as indented JSON with its check."""
+        content = {"schema": SCHEMA, **vars(self)}
+        return (json.dumps({**content, "check": _check(content)}, indent=1, ensure_ascii=False) + "\n").encode()
+
+    @classmethod
+    def from_json(cls, text: bytes, stage: str, key: str) -> Record:
+        """The record in ``text``, verified.
+
+        Raises ``BadRecordError`` for a damaged record and ``NewerFormatError`` for one of a newer schema.
+        """
+        try:
+            content = json.loads(text)
+            schema = content["schema"]
+        except (ValueError, KeyError, TypeError) as error:
+            raise BadRecordError from error
+        if isinstance(schema, int) and schema > SCHEMA:
+            raise NewerFormatError(
+                f"{stage}/{key[:SHORT]} was written by a newer koop (format {schema}, this one reads {SCHEMA}): "
+                "update koop or choose another --store"
+            )
+        try:
+            check = content.pop("check")
+            if check != _check(content) or content.pop("schema") != SCHEMA:
+                raise BadRecordError
+            record = cls(**content)
+            if (record.stage, record.key) != (stage, key):
+                raise BadRecordError
+        except (KeyError, TypeError, AttributeError) as error:
+            raise BadRecordError from error
+        return record
+
+
+def _check(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(canonical(content)).hexdigest()

@@ -1,0 +1,221 @@
+"""The store: objects by digest, records by key. The record is the commit point.
+
+objects/ab/<sha256>.h5   records/<stage>/<key>.json   partial/<key>/<i>-<sha256>.h5
+refs/ (pins)   locks/   tmp/   quarantine/
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock, Timeout
+
+from koopcli.errors import (
+    DamagedArtefactError,
+    InvalidValueError,
+    LockTimeoutError,
+    StorageError,
+    UnknownNameError,
+)
+from koopcli.records import Packed
+from koopcli.store import image
+from koopcli.store.files import publish, sha256_file, storage_errors, sweep
+from koopcli.store.identity import data_digest
+from koopcli.store.records import SHORT, BadRecordError, Record
+
+LOCK_TIMEOUT = "KOOP_LOCK_TIMEOUT"
+CANDIDATES = 8
+
+
+def store_root(given: str | Path | None = None) -> Path:
+    """The store's folder: ``given``, else ``$KOOP_STORE``, else ``./artefacts``."""
+    return Path(given or os.environ.get("KOOP_STORE") or "artefacts").expanduser()
+
+
+class Store:
+    """A folder of artefacts. Reading takes no lock and writes nothing; ``warn`` receives what a user should know."""
+
+    def __init__(self, root: Path, warn: Callable[[str], None] = lambda text: None) -> None:
+        self.root = root
+        self.warn = warn
+        self._swept = False
+        if root.exists() and not root.is_dir():
+            raise StorageError(f"the store {root} is not a folder: choose another with --store")
+
+    # reading
+
+    def record(self, stage: str, key: str) -> Record | None:
+        """The record of ``key``, or None; a damaged one is put aside."""
+        path = self.root / "records" / stage / f"{key}.json"
+        try:
+            text = path.read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise StorageError(f"cannot read {path}: {error.strerror}") from error
+        try:
+            return Record.from_json(text, stage, key)
+        except BadRecordError:
+            self.warn(f"the record of {stage}/{key[:SHORT]} is damaged and was put aside")
+            self._put_aside(path)
+            return None
+
+    def index(self) -> list[tuple[str, str]]:
+        """(stage, key) of every record, by stage."""
+        return sorted((p.parent.name, p.stem) for p in (self.root / "records").glob("*/*.json"))
+
+    def find(self, text: str) -> Record:
+        """The record whose name or key starts with ``text``.
+
+        Raises ``UnknownNameError`` for none or several.
+        """
+        matches = [(s, k) for s, k in self.index() if text and (f"{s}/{k}".startswith(text) or k.startswith(text))]
+        if len(matches) > 1:
+            names = ", ".join(f"{stage}/{key[:SHORT]}" for stage, key in matches[:CANDIDATES])
+            more = f" and {len(matches) - CANDIDATES} more" if len(matches) > CANDIDATES else ""
+            raise UnknownNameError(f"'{text}' is ambiguous: {names}{more}")
+        record = self.record(*matches[0]) if matches else None
+        if record is None:
+            raise UnknownNameError(f"there is no artefact '{text}' in {self.root}: `koop ls` lists what there is")
+        return record
+
+    def path(self, record: Record) -> Path:
+        """Where the object of ``record`` lies."""
+        return self._object_path(record.object)
+
+    def has_object(self, record: Record) -> bool:
+        """Whether the object is there; a record without its object is a miss."""
+        return self.path(record).is_file()
+
+    def read(self, record: Record) -> Packed:
+        """The verified content. Raises ``DamagedArtefactError`` after putting a damaged object aside."""
+        path = self.path(record)
+        try:
+            if path.stat().st_size <= image.MEMORY_LIMIT:
+                content = path.read_bytes()
+                if hashlib.sha256(content).hexdigest() == record.object:
+                    return image.from_bytes(content)
+            elif sha256_file(path) == record.object:
+                return image.from_file(path)
+        except FileNotFoundError as error:
+            raise DamagedArtefactError(f"the object of {record.name} is missing") from error
+        except OSError as error:
+            raise StorageError(f"cannot read {path}: {error.strerror or error}") from error
+        self._put_aside(path)
+        raise DamagedArtefactError(f"the object of {record.name} is damaged and was put aside")
+
+    # writing
+
+    def commit(
+        self,
+        recipe: Mapping[str, Any],
+        lineage: Mapping[str, str],
+        packed: Packed,
+        provenance: Mapping[str, Any],
+    ) -> Record:
+        """Store ``packed`` under ``recipe``: the object first, the record last."""
+        path = self._put(packed, self._object_path)
+        record = Record(recipe, lineage, path.stem, path.stat().st_size, data_digest(packed), provenance)
+        with storage_errors(self.root):
+            self._publish(self.root / "records" / record.stage / f"{record.key}.json", record.to_json())
+        return record
+
+    @contextmanager
+    def lock(self, key: str, name: str) -> Iterator[None]:
+        """Hold the lock of ``key`` while making it. Correctness never rests on it: without locks, warn and go on."""
+        lock = FileLock(self.root / "locks" / f"{key}.lock")
+        with storage_errors(self.root):
+            (self.root / "locks").mkdir(parents=True, exist_ok=True)
+        try:
+            lock.acquire(timeout=0)
+        except Timeout:
+            self.warn(f"waiting for another process that is making {name}")
+            self._wait(lock, name)
+        except NotImplementedError:
+            self.warn("this file system has no locks: two processes may make the same artefact twice")
+        except OSError as error:
+            if isinstance(error, PermissionError):
+                with storage_errors(self.root):
+                    raise
+            self.warn(f"no lock to be had here ({error.strerror}): two processes may make the same artefact twice")
+        try:
+            yield
+        finally:
+            lock.release()
+
+    def parts(self, key: str) -> Parts:
+        """The committed chunks of an unfinished artefact."""
+        return Parts(self, key)
+
+    def _put(self, packed: Packed, target: Callable[[str], Path]) -> Path:
+        """Write the image of ``packed`` to ``target(sha256)``, through memory unless it is large."""
+        needed = image.data_bytes(packed)
+        with storage_errors(self.root, needed):
+            if needed <= image.MEMORY_LIMIT:
+                content = image.to_bytes(packed)
+                return self._publish(target(hashlib.sha256(content).hexdigest()), content)
+            return self._publish(lambda path: target(sha256_file(path)), lambda path: image.to_file(packed, path))
+
+    def _publish(self, target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path], None]) -> Path:
+        """Publish a file; the first time, clear old litter by the file system's own clock."""
+        temporary = self.root / "tmp"
+        final = publish(target, fill, temporary)
+        if not self._swept:
+            self._swept = True
+            sweep(temporary, final.stat().st_mtime)
+        return final
+
+    def _wait(self, lock: FileLock, name: str) -> None:
+        text = os.environ.get(LOCK_TIMEOUT, "3600")
+        try:
+            seconds = float(text)
+        except ValueError as error:
+            raise InvalidValueError(f"{LOCK_TIMEOUT} must be a number of seconds, got {text!r}") from error
+        try:
+            lock.acquire(timeout=seconds)
+        except Timeout as error:
+            raise LockTimeoutError(
+                f"another process has been making {name} for over {seconds:g} s: wait for it, or raise {LOCK_TIMEOUT}"
+            ) from error
+
+    def _object_path(self, digest: str) -> Path:
+        return self.root / "objects" / digest[:2] / f"{digest}.h5"
+
+    def _put_aside(self, path: Path) -> None:
+        quarantine = self.root / "quarantine"
+        with suppress(OSError):  # a read-only store keeps its damage where it is
+            quarantine.mkdir(exist_ok=True)
+            os.replace(path, quarantine / path.name)
+
+
+class Parts:
+    """Chunks of an unfinished artefact, each committed by itself and named by number and digest."""
+
+    def __init__(self, store: Store, key: str) -> None:
+        self._store = store
+        self._folder = store.root / "partial" / key
+
+    def read(self, i: int) -> Packed | None:
+        """Chunk ``i``, verified, or None."""
+        for path in sorted(self._folder.glob(f"{i}-*.h5")):
+            content = path.read_bytes()
+            if hashlib.sha256(content).hexdigest() == path.stem.partition("-")[2]:
+                return image.from_bytes(content)
+            path.unlink()
+        return None
+
+    def commit(self, i: int, packed: Packed) -> None:
+        """Store chunk ``i``."""
+        self._store._put(packed, lambda sha: self._folder / f"{i}-{sha}.h5")
+
+    def clear(self) -> None:
+        """Remove the chunks: the finished artefact holds them."""
+        with suppress(OSError):
+            for path in self._folder.iterdir():
+                path.unlink()
+            self._folder.rmdir()

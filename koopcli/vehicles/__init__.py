@@ -1,0 +1,1 @@
+"""Vehicles and the plants (equations of motion) they are put into."""
