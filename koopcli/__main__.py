@@ -11,7 +11,7 @@ from types import FrameType
 import typer
 
 from koopcli.cli.app import app
-from koopcli.errors import KoopError
+from koopcli.errors import InvalidValueError, KoopError
 
 RESUME = "interrupted: nothing committed is lost; run the same command again to resume"
 INTERRUPTED, TERMINATED = 130, 143
@@ -25,7 +25,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KoopError as error:
         return _fail(str(error), error.exit_code)
     except typer.TyperException as error:
-        return _fail(error.format_message(), getattr(error, "exit_code", 2))
+        return _fail(error.format_message().replace("Value error, ", ""), getattr(error, "exit_code", 2))
+    except MemoryError as error:
+        return _fail(
+            f"not enough memory ({error}): lower the count, the steps or the order", InvalidValueError.exit_code
+        )
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
     except SystemExit as error:
@@ -39,7 +43,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _fail(text: str, code: int) -> int:
-    print(f"koop: {' '.join(text.split())}", file=sys.stderr)
+    if text:
+        print(f"koop: {' '.join(text.split())}", file=sys.stderr)
     return code
 
 

@@ -98,7 +98,7 @@ def coerce(  # noqa: PLR0911  (one return for each kind of type reads best)
 def candidates(name: str, known: Any) -> str:
     """The tail of an error message that lists what would have been right, the nearest first."""
     names = [str(k) for k in known]
-    near = get_close_matches(name, names, n=1)
+    near = get_close_matches(name, names, n=1, cutoff=0.5)
     listed = ", ".join(names) if names else "none"
     return f": did you mean '{near[0]}'? (known: {listed})" if near else f" (known: {listed})"
 

@@ -27,27 +27,23 @@ class Console:
         """A line that says what may be wrong."""
         self._print(f"warning: {text}")
 
-    def table(self, header: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = "") -> None:
-        """A table on stderr."""
-        show_table(header, rows, title=title, file=sys.stderr)
-
     @contextmanager
     def progress(self, label: str) -> Iterator[Progress]:
-        """A bar that appears with the first report and goes when the work is done."""
+        """A bar for the time of a ``with``; bars inside one another share the display."""
         if not sys.stderr.isatty():
             yield silent
             return
-        from rich.console import Console as RichConsole  # noqa: PLC0415
-        from rich.progress import BarColumn, TextColumn, TimeRemainingColumn  # noqa: PLC0415
-        from rich.progress import Progress as RichProgress  # noqa: PLC0415
-
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
-        with RichProgress(*columns, TimeRemainingColumn(), console=RichConsole(stderr=True), transient=True) as bars:
-            bar = bars.add_task(label, total=None)
-            self._bars = bars
-            try:
-                yield lambda done, total: bars.update(bar, completed=done, total=total)
-            finally:
+        outermost = self._bars is None
+        bars = self._bars = self._bars or _bars()
+        if outermost:
+            bars.start()
+        bar = bars.add_task(label, total=None)
+        try:
+            yield lambda done, total: bars.update(bar, completed=done, total=total)
+        finally:
+            bars.remove_task(bar)
+            if outermost:
+                bars.stop()
                 self._bars = None
 
     def _print(self, text: str) -> None:
@@ -57,17 +53,32 @@ class Console:
             print(text, file=sys.stderr, flush=True)
 
 
-def show_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, title: str, file: IO[str]) -> None:
-    """A table of texts; columns after the first align right. Off a terminal no row is folded or cut."""
+def _bars() -> Bars:
+    from rich.console import Console as RichConsole  # noqa: PLC0415
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn  # noqa: PLC0415
+    from rich.progress import Progress as RichProgress  # noqa: PLC0415
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
+    return RichProgress(*columns, TimeRemainingColumn(), console=RichConsole(stderr=True), transient=True)
+
+
+def show_table(
+    header: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = "", left: int = 1, file: IO[str] | None = None
+) -> None:
+    """A table of texts on stdout or ``file``, its first ``left`` columns flush left.
+
+    Off a terminal no row is folded or cut.
+    """
     from rich.box import SIMPLE  # noqa: PLC0415
     from rich.console import Console as RichConsole  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
+    target = file or sys.stdout
     table = Table(title=title or None, box=SIMPLE, title_justify="left", title_style="bold", pad_edge=False)
     for i, name in enumerate(header):
-        table.add_column(Text(name), justify="left" if i == 0 else "right", overflow="fold")
+        table.add_column(Text(name), justify="left" if i < left else "right", overflow="fold")
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
-    width = None if file.isatty() else 400
-    RichConsole(file=file, width=width).print(table)
+    width = None if target.isatty() else 400
+    RichConsole(file=target, width=width).print(table)

@@ -15,7 +15,8 @@ app = typer.Typer(
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
     help="Identify Koopman predictors of vehicle dynamics.\n\nEvery command makes or reads artefacts in a store; "
-    "a command named alone makes what it needs and reuses what is there.\n\n"
+    "a command named alone makes what it needs and reuses what is there. Defaults stand in parentheses; they are "
+    "the paper's, and an --experiment file or --set changes any of them.\n\n"
     "Example: koop fit-edmd --order 7 && koop evaluate",
 )
 reproduce.register(app)

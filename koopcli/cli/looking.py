@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from koopcli.cli.options import JsonOption, StoreOption
+from koopcli.cli.options import JsonOption, StoreOption, complete_name
 from koopcli.cli.session import open_store, print_json
 from koopcli.console import show_table
 from koopcli.errors import UnknownNameError
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from koopcli.stages.base import Task
     from koopcli.stages.pipeline import Artefact
 
-NameArgument = Annotated[str, typer.Argument(help="An artefact, by name or any unambiguous beginning of it.")]
+NameArgument = Annotated[
+    str, typer.Argument(autocompletion=complete_name, help="An artefact, by name or any unambiguous beginning of it.")
+]
 
 
 def ls(
@@ -62,14 +64,14 @@ def ls(
         [
             row["name"],
             row["made"].replace("T", " ")[:16],
-            f"{row['seconds']:.1f} s",
-            size_text(row["bytes"]) if row["object"] else "missing",
             "pinned" if row["pinned"] else "",
             _brief(row["settings"]),
+            f"{row['seconds']:.1f} s",
+            size_text(row["bytes"]) if row["object"] else "missing",
         ]
         for row in rows
     ]
-    show_table(["artefact", "made (UTC)", "took", "size", "", "settings"], table, title="", file=sys.stdout)
+    show_table(["artefact", "made (UTC)", "", "settings", "took", "size"], table, left=4)
 
 
 def show(
@@ -91,7 +93,7 @@ def show(
         "name": record.name,
         "path": str(path),
         "figures": artefact.figures,
-        "settings": dict(_settings(task, record.stage)),
+        "settings": dict(_settings(task, "")),
         "inputs": dict(record.lineage),
         "arrays": {
             name: {"shape": list(a.values.shape), "axes": list(a.axes), "units": a.units}
@@ -102,7 +104,10 @@ def show(
     if as_json:
         print_json(full)
         return
-    show_table(["", ""], [[key, text] for key, text in _rows(full)], title="", file=sys.stdout)
+    for heading, facts in _sections(full):
+        print(heading)
+        for key, text in _rows(facts):
+            print(f"  {key:<24} {text}")
 
 
 def path(name: NameArgument, store: StoreOption = None) -> None:
@@ -127,7 +132,10 @@ def pin(name: NameArgument, store: StoreOption = None) -> None:
 
 
 def unpin(
-    name: Annotated[str, typer.Argument(help="An artefact by name or beginning, or the label of a pin.")],
+    name: Annotated[
+        str,
+        typer.Argument(autocompletion=complete_name, help="An artefact by name or beginning, or the label of a pin."),
+    ],
     store: StoreOption = None,
 ) -> None:
     """Take back a pin, of one artefact or of a reproduction.
@@ -154,21 +162,32 @@ def _obtain(name: str, store: Path | None) -> tuple[Artefact, Task, Path]:
 
 
 def _settings(task: Task, role: str) -> Iterator[tuple[str, Any]]:
-    """The settings of a task and of all behind it, each under the chain of roles that leads to it."""
-    yield role, dict(asdict(task.settings))
+    """The settings of a task and of all behind it, each under the roles that lead to it and its stage."""
+    yield f"{role} ({task.stage})" if role else task.stage, asdict(task.settings)
     for name, upstream in task.inputs:
-        yield from _settings(upstream, f"{role} < {name}")
+        yield from _settings(upstream, f"{role} / {name}".removeprefix(" / "))
+
+
+def _sections(full: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Everything `show` prints, under headings."""
+    yield full["name"], {"path": full["path"]}
+    yield "figures", full["figures"]
+    for role, settings in full["settings"].items():
+        yield f"settings of {role}", settings
+    yield "inputs", full["inputs"]
+    yield "arrays", full["arrays"]
+    yield "provenance", full["provenance"]
 
 
 def _rows(value: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
     """Nested facts as rows of dotted names and short texts."""
     for key, entry in value.items():
         name = f"{prefix}{key}"
-        if isinstance(entry, dict) and "axes" not in entry:
-            yield from _rows(entry, f"{name}: " if not prefix else f"{name}.")
-        elif isinstance(entry, dict):
+        if isinstance(entry, dict) and "axes" in entry:
             shape = " × ".join(map(str, entry["shape"]))
             yield name, f"{shape} ({', '.join(entry['axes'])}) in {entry['units']}"
+        elif isinstance(entry, dict):
+            yield from _rows(entry, f"{name}.")
         elif isinstance(entry, (list, tuple)):
             yield name, " ".join(map(str, entry))
         else:

@@ -14,22 +14,46 @@ from koopcli.cli.options import (
     SetOption,
     StoreOption,
     VehicleOption,
+    complete_name,
+    names,
 )
 from koopcli.cli.session import open_session
 from koopcli.config.experiment import Values
-from koopcli.config.settings import BasisName, Draw, Excitation, ForcePer, Kind, PlantName
+from koopcli.config.settings import (
+    BasisName,
+    BoxSample,
+    Draw,
+    Excitation,
+    FitEdmd,
+    ForcePer,
+    GridSample,
+    Kind,
+    PlantName,
+    Simulate,
+)
 
 TEST_SECTIONS = ("test", "evaluate")
 
 
 def sample(
-    kind: Annotated[Kind, typer.Argument(help="grid: the EDMD dataset; box: test states.")] = "grid",
+    kind: Annotated[
+        Kind | None,
+        typer.Argument(metavar=f"[{names(Kind)}]", help="grid: the EDMD dataset (the default); box: test states."),
+    ] = None,
     seed: SeedOption = None,
-    count: Annotated[int | None, typer.Option(help="grid: values per state [15]; box: states [3375].")] = None,
-    draw: Annotated[Draw | None, typer.Option(help="grid: how values are chosen. [random]")] = None,
-    excitation: Annotated[Excitation | None, typer.Option(help="box: the inputs. [fresh]")] = None,
-    amplitude: Annotated[float | None, typer.Option(help="box: inputs within ± amplitude, in N. [1e4]")] = None,
-    steps: Annotated[int | None, typer.Option(help="box: steps of each trajectory. [30]")] = None,
+    count: Annotated[
+        int | None, typer.Option(help=f"grid: values per state ({GridSample.count}); box: states ({BoxSample.count}).")
+    ] = None,
+    draw: Annotated[
+        Draw | None, typer.Option(metavar=names(Draw), help=f"grid: how values are chosen ({GridSample.draw}).")
+    ] = None,
+    excitation: Annotated[
+        Excitation | None, typer.Option(metavar=names(Excitation), help=f"box: the inputs ({BoxSample.excitation}).")
+    ] = None,
+    amplitude: Annotated[
+        float | None, typer.Option(help=f"box: inputs within ± amplitude, in N ({BoxSample.amplitude:g}).")
+    ] = None,
+    steps: Annotated[int | None, typer.Option(help=f"box: steps of each trajectory ({BoxSample.steps}).")] = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
@@ -56,14 +80,21 @@ def sample(
 
 
 def simulate(
-    sample: Annotated[str | None, typer.Argument(help="A sample; made from the settings when left out.")] = None,
-    plant: Annotated[PlantName | None, typer.Option(help="Equations of motion. [forces]")] = None,
+    sample: Annotated[
+        str | None, typer.Argument(autocompletion=complete_name, help="A sample; made from the settings when left out.")
+    ] = None,
+    plant: Annotated[
+        PlantName | None, typer.Option(metavar=names(PlantName), help=f"Equations of motion ({Simulate.plant}).")
+    ] = None,
     vehicle: VehicleOption = None,
     steps: Annotated[
-        int | None, typer.Option(help="Steps of each trajectory. [as the sample says: 1 for a grid]")
+        int | None, typer.Option(help="Steps of each trajectory (as the sample says; 1 for a grid).")
     ] = None,
-    dt: Annotated[float | None, typer.Option(help="Sampling period in s, one RK4 step. [0.01]")] = None,
-    force_per: Annotated[ForcePer | None, typer.Option(help="What an input force acts on. [axle]")] = None,
+    dt: Annotated[float | None, typer.Option(help=f"Sampling period in s, one RK4 step ({Simulate.dt}).")] = None,
+    force_per: Annotated[
+        ForcePer | None,
+        typer.Option(metavar=names(ForcePer), help=f"What an input force acts on ({Simulate.force_per})."),
+    ] = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
@@ -84,10 +115,13 @@ def simulate(
 
 def fit_edmd(
     trajectories: Annotated[
-        str | None, typer.Argument(help="Trajectories; made from the settings when left out.")
+        str | None,
+        typer.Argument(autocompletion=complete_name, help="Trajectories; made from the settings when left out."),
     ] = None,
-    order: Annotated[int | None, typer.Option(help="Highest degree of each state. [7]")] = None,
-    basis: Annotated[BasisName | None, typer.Option(help="Family of observables. [tensor]")] = None,
+    order: Annotated[int | None, typer.Option(help=f"Highest degree of each state ({FitEdmd.order}).")] = None,
+    basis: Annotated[
+        BasisName | None, typer.Option(metavar=names(BasisName), help=f"Family of observables ({FitEdmd.basis}).")
+    ] = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
@@ -106,12 +140,23 @@ def fit_edmd(
 
 
 def evaluate(
-    predictor: Annotated[str | None, typer.Argument(help="A predictor; made from the settings when left out.")] = None,
-    on: Annotated[str | None, typer.Option(metavar="TRAJECTORIES", help="Test on these trajectories.")] = None,
-    excitation: Annotated[Excitation | None, typer.Option(help="Inputs of the test set. [fresh]")] = None,
-    amplitude: Annotated[float | None, typer.Option(help="Test inputs within ± amplitude, in N. [1e4]")] = None,
-    count: Annotated[int | None, typer.Option(help="Test trajectories. [3375]")] = None,
-    steps: Annotated[int | None, typer.Option(help="Steps of each test trajectory. [30]")] = None,
+    predictor: Annotated[
+        str | None,
+        typer.Argument(autocompletion=complete_name, help="A predictor; made from the settings when left out."),
+    ] = None,
+    on: Annotated[
+        str | None,
+        typer.Option(autocompletion=complete_name, metavar="TRAJECTORIES", help="Test on these trajectories."),
+    ] = None,
+    excitation: Annotated[
+        Excitation | None,
+        typer.Option(metavar=names(Excitation), help=f"Inputs of the test set ({BoxSample.excitation})."),
+    ] = None,
+    amplitude: Annotated[
+        float | None, typer.Option(help=f"Test inputs within ± amplitude, in N ({BoxSample.amplitude:g}).")
+    ] = None,
+    count: Annotated[int | None, typer.Option(help=f"Test trajectories ({BoxSample.count}).")] = None,
+    steps: Annotated[int | None, typer.Option(help=f"Steps of each test trajectory ({BoxSample.steps}).")] = None,
     seed: SeedOption = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",

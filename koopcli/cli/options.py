@@ -3,13 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, get_args
 
 import typer
 
+
+def names(literal: Any) -> str:
+    """The allowed names of an option, as its placeholder in the help."""
+    return "|".join(get_args(literal))
+
+
+def complete_name(incomplete: str) -> list[str]:
+    """Names of artefacts in the default store that begin with ``incomplete``, for shell completion."""
+    from koopcli.store import Store, store_root
+    from koopcli.store.records import SHORT
+
+    names = [f"{stage}/{key[:SHORT]}" for stage, key in Store(store_root()).index()]
+    return [name for name in names if name.startswith(incomplete)]
+
+
 StoreOption = Annotated[
     Path | None,
-    typer.Option("--store", metavar="DIR", help="Folder of artefacts. [default: $KOOP_STORE or ./artefacts]"),
+    typer.Option("--store", metavar="DIR", help="Folder of artefacts ($KOOP_STORE or ./artefacts)."),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the name or table.")]
 DryRunOption = Annotated[

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
 from koopcli.checks import candidates
-from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption
+from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption, complete_name
 from koopcli.cli.session import open_session, print_json
 from koopcli.config.settings import FigureName, ImageFormat
 from koopcli.console import show_table
@@ -22,7 +21,8 @@ if TYPE_CHECKING:
 def plot(
     figure: Annotated[str | None, typer.Argument(help="Name of the figure; --list shows them.")] = None,
     artefacts: Annotated[
-        list[str] | None, typer.Argument(metavar="[ARTEFACT]...", help="What to draw; made when left out.")
+        list[str] | None,
+        typer.Argument(autocompletion=complete_name, metavar="[ARTEFACT]...", help="What to draw; made when left out."),
     ] = None,
     output: Annotated[
         Path | None,
@@ -89,7 +89,7 @@ def _list(*, as_json: bool) -> None:
     if as_json:
         print_json({name: kind.about for name, kind in FIGURES.items()})
         return
-    show_table(["figure", "shows"], [[name, kind.about] for name, kind in FIGURES.items()], title="", file=sys.stdout)
+    show_table(["figure", "shows"], [[name, kind.about] for name, kind in FIGURES.items()], left=2)
 
 
 def register(app: typer.Typer) -> None:

@@ -29,7 +29,7 @@ SWEPT = {
 
 
 def reproduce(
-    method: Annotated[Method, typer.Argument(help="edmd: the paper's first method.")] = "edmd",
+    method: Annotated[Method, typer.Argument(metavar="[edmd]", help="edmd: the paper's first method.")] = "edmd",
     smoke: Annotated[bool, typer.Option("--smoke", help="A reduced grid, in seconds (experiment 'smoke').")] = False,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
@@ -60,12 +60,7 @@ def reproduce(
         steps = {step.task: step for task in tasks for step in session.pipeline.plan(task)}
         show_plan(list(steps.values()), as_json=as_json)
         return
-    with session.console.progress("reproduce edmd") as progress:
-        total = sum(1 for _, one in runs for _ in reproduction.sweep_tasks(one))
-        sweeps: list[tuple[str, Sweep]] = []
-        for label, one in runs:
-            sweeps.append((label, reproduction.run_sweep(one, session.pipeline)))
-            progress(sum(len(sweep.records) for _, sweep in sweeps), total)
+    sweeps = [(label, reproduction.run_sweep(one, session.pipeline, label)) for label, one in runs]
     _finish(session, sweeps, as_json=as_json)
 
 

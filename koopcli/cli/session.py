@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -113,7 +112,7 @@ def show_plan(steps: Sequence[Step], *, as_json: bool) -> None:
         cost = (f"{step.cost.seconds:.1f} s", size_text(step.cost.bytes)) if made else ("", "")
         table.append([step.name, step.state, *cost])
     table.append(["total, roughly", "", f"{seconds:.1f} s", size_text(size)])
-    show_table(["artefact", "would", "time", "size"], table, title="", file=sys.stdout)
+    show_table(["artefact", "would", "time", "size"], table, left=2)
 
 
 def _finite(value: Any) -> Any:

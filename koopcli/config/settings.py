@@ -73,7 +73,8 @@ class BoxSample:
     def settled(self) -> BoxSample:
         """The same sample with what does not matter for its excitation at a fixed value: one sample, one key."""
         amplitude = 0.0 if self.excitation == "none" else self.amplitude
-        return replace(self, amplitude=amplitude, steps=self.steps if self.excitation == "fresh" else 1)
+        steps = self.steps if self.excitation == "fresh" else BoxSample.steps
+        return replace(self, amplitude=amplitude, steps=steps)
 
 
 SAMPLES: dict[str, type[GridSample] | type[BoxSample]] = {"grid": GridSample, "box": BoxSample}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +14,7 @@ from koopcli.stages.registry import STAGES
 from koopcli.store import Record, Store
 from koopcli.store.identity import SCHEMA, key_of, plain
 from koopcli.store.provenance import provenance
+from koopcli.store.records import SHORT
 
 
 @dataclass(frozen=True)
@@ -121,52 +121,50 @@ class Pipeline:
     def _obtain(self, task: Task) -> tuple[Record, Any, bool]:
         """Record, content, and whether it was there already."""
         record = self._known(task)
-        damaged = False
-        if record is not None and self.store.has_object(record):
-            try:
-                content = STAGES[task.stage].unpack(self.store.read(record))
-            except DamagedArtefactError as error:
-                self.reporter.warn(f"{error}; it is made again")
-                damaged = True
-            else:
-                self._announce(task, record, None)
-                return record, content, True
-        elif record is not None and task.key is not None:
-            self.reporter.warn(f"the object of {record.name} is missing; it is made again")
-        self._records.pop(task, None)
+        found = self._read(task, record)
+        if record is not None and found is not None:
+            return record, found, True
         if task.key is not None:
             self._rebuildable(task, record)
-        return self._build(task, damaged)
+        return self._build(task)
 
-    def _build(self, task: Task, damaged: bool) -> tuple[Record, Any, bool]:
+    def _read(self, task: Task, record: Record | None) -> Any:
+        """The verified content behind ``record``, or None when it is not there or damaged."""
+        if record is None or not self.store.has_object(record):
+            return None
+        try:
+            content = STAGES[task.stage].unpack(self.store.read(record))
+        except DamagedArtefactError as error:
+            self.reporter.warn(f"{error}; making it again")
+            return None
+        self._records[task] = record
+        self._announce(record, "reused")
+        return content
+
+    def _build(self, task: Task) -> tuple[Record, Any, bool]:
         """Make ``task`` under its lock, unless another process has just done so."""
         stage = STAGES[task.stage]
-        inputs: dict[str, tuple[Record, Any]] = {}
-        for role, upstream in task.inputs:
-            record, content, _ = self._obtain(upstream)
-            inputs[role] = (record, content)
+        inputs = {role: self._obtain(upstream)[:2] for role, upstream in task.inputs}
         recipe = _recipe(task, {role: record for role, (record, _) in inputs.items()})
         key = key_of(recipe)
-        name = f"{task.stage}/{key[:12]}"
-        with self.store.lock(key, name):
+        with self.store.lock(key, f"{task.stage}/{key[:SHORT]}"):
             there = self.store.record(task.stage, key)
-            if there is not None and self.store.has_object(there) and not damaged:
-                content = stage.unpack(self.store.read(there))
-                self._announce(task, there, None)
-                return there, content, True
+            found = self._read(task, there)
+            if there is not None and found is not None:
+                return there, found, True
             start = time.perf_counter()
             parts = self.store.parts(key)
-            with ExitStack() as stack:
-                progress = stack.enter_context(self.reporter.progress(f"{stage.name} {name.partition('/')[2]}"))
-                chunks = _Chunks(parts, progress, self.reporter.note)
-                context = Context(progress, self.reporter.warn, chunks)
+            with self.reporter.progress(stage.name) as progress:
+                context = Context(progress, self.reporter.warn, _Chunks(parts, progress, self.reporter.note))
                 content = stage.run(task.settings, {role: content for role, (_, content) in inputs.items()}, context)
             seconds = time.perf_counter() - start
             lineage = {role: f"{record.stage}/{record.key}" for role, (record, _) in inputs.items()}
             made = self.store.commit(recipe, lineage, content.pack(), provenance(seconds))
             parts.clear()
+        # Go on with what a later process would read: the memory layout of an array moves the last bits of products.
+        content = stage.unpack(self.store.read(made))
         self._records[task] = made
-        self._announce(task, made, f"made in {seconds:.1f} s: {stage.describe(stage.figures(content))}")
+        self._announce(made, f"made in {seconds:.1f} s: {stage.describe(stage.figures(content))}")
         return made, content, False
 
     def _rebuildable(self, task: Task, record: Record | None) -> None:
@@ -176,14 +174,14 @@ class Pipeline:
         complete = record is not None and set(known) == set(record.lineage)
         if not complete or key_of(_recipe(task, known)) != task.key:
             raise DamagedArtefactError(
-                f"{task.stage}/{(task.key or '')[:12]} is damaged and cannot be made again: its inputs are gone or it "
-                "was made by another version; run its command afresh"
+                f"{task.stage}/{(task.key or '')[:SHORT]} is damaged and cannot be made again, because its inputs are "
+                "gone or another version made it: run its command afresh"
             )
 
-    def _announce(self, task: Task, record: Record, made: str | None) -> None:
+    def _announce(self, record: Record, what: str) -> None:
         if record.name not in self._announced:
             self._announced.add(record.name)
-            self.reporter.note(f"{record.name:<24} {made or 'reused'}")
+            self.reporter.note(f"{record.name:<24} {what}")
 
 
 @dataclass

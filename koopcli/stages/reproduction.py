@@ -61,14 +61,17 @@ def sweep_tasks(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
                 yield Cell(draw, training.seed, order, excitation), recipes.evaluation(cell)
 
 
-def run_sweep(experiment: Experiment, pipeline: Pipeline) -> Sweep:
-    """Make or find every cell."""
+def run_sweep(experiment: Experiment, pipeline: Pipeline, label: str) -> Sweep:
+    """Make or find every cell, with a progress display called ``label``."""
     figures: dict[Cell, Meta] = {}
     records: list[Record] = []
-    for cell, task in sweep_tasks(experiment):
-        artefact = pipeline.make(task)
-        figures[cell] = artefact.figures
-        records.append(artefact.record)
+    cells = list(sweep_tasks(experiment))
+    with pipeline.reporter.progress(label) as progress:
+        for i, (cell, task) in enumerate(cells):
+            progress(i, len(cells))
+            artefact = pipeline.make(task)
+            figures[cell] = artefact.figures
+            records.append(artefact.record)
     return Sweep(experiment, figures, tuple(records))
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
+import numpy as np
+
 from koopcli.checks import build
 from koopcli.config.settings import BoxSample, Simulate
 from koopcli.errors import InvalidValueError
@@ -18,7 +20,14 @@ def _run(settings: Simulate, inputs: Inputs, context: Context) -> Trajectories:
     assert settings.steps is not None
     plant = PLANTS[settings.plant](settings.vehicle, WHEELS_PER_FORCE[settings.force_per])
     x0, u = sample.expand(settings.steps)
-    x = simulate(plant.rhs, x0, u, settings.dt, context.progress)
+    with np.errstate(over="ignore", invalid="ignore"):
+        x = simulate(plant.rhs, x0, u, settings.dt, context.progress)
+    lost = ~np.isfinite(x).all(axis=(1, 2))
+    if lost.any():
+        raise InvalidValueError(
+            f"{lost.sum()} of {len(x)} simulated trajectories leave the finite numbers, the first is number "
+            f"{int(lost.argmax())}: lower simulate.dt, the steps or the input amplitude"
+        )
     about = {"plant": settings.plant, "force_per": settings.force_per, "vehicle": asdict(settings.vehicle)}
     return Trajectories(x, u, settings.dt, plant.states, plant.inputs, sample.product, about)
 

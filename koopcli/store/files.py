@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import os
 import secrets
@@ -24,10 +23,10 @@ def storage_errors(path: Path, needed: int = 0) -> Iterator[None]:
         yield
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error).splitlines()[0]
-        text = f"cannot write to the store at {path}: {reason}"
-        if needed or error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-            text += f" ({size_text(needed)} needed, {size_text(_free(path))} free)"
-        raise StorageError(f"{text}; free some space or choose another folder with --store") from error
+        room = f"{size_text(needed)} needed, {size_text(_free(path))} free"
+        raise StorageError(
+            f"cannot write to the store at {path}: {reason} ({room}); free some space or choose another with --store"
+        ) from error
 
 
 def publish(target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path], None], temporary: Path) -> Path:

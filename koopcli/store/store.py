@@ -202,11 +202,12 @@ class Parts:
 
     def read(self, i: int) -> Packed | None:
         """Chunk ``i``, verified, or None."""
-        for path in sorted(self._folder.glob(f"{i}-*.h5")):
-            content = path.read_bytes()
-            if hashlib.sha256(content).hexdigest() == path.stem.partition("-")[2]:
-                return image.from_bytes(content)
-            path.unlink()
+        with storage_errors(self._folder):
+            for path in sorted(self._folder.glob(f"{i}-*.h5")):
+                content = path.read_bytes()
+                if hashlib.sha256(content).hexdigest() == path.stem.partition("-")[2]:
+                    return image.from_bytes(content)
+                path.unlink()
         return None
 
     def commit(self, i: int, packed: Packed) -> None:

@@ -1,0 +1,198 @@
+"""Bad input: the exit code of its kind, one line, no traceback, nothing written."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+
+import pytest
+from filelock import FileLock
+
+from koopcli.__main__ import main
+
+BAD_VEHICLE = '[parameters]\nm = { value = -1300.0, unit = "kg" }\n'
+
+
+def one_line(result, code, *parts):
+    assert result.code == code, result.err
+    last = result.err.splitlines()[-1]
+    assert last.startswith("koop: ")
+    assert "Traceback" not in result.err
+    for part in parts:
+        assert part in last
+    assert result.out == ""
+
+
+@pytest.mark.parametrize(
+    ("args", "code", "part"),
+    [
+        (["fit-edmd", "--ordre", "3"], 2, "--ordre"),
+        (["fti-edmd"], 2, "fti-edmd"),
+        (["sample", "cube"], 2, "cube"),
+        (["sample", "grid", "--draw", "odd"], 2, "odd"),
+        (["sample", "grid", "--excitation", "held"], 2, "unknown setting 'sample.excitation'"),
+        (["fit-edmd", "--set", "fit-edmd.degree=3"], 2, "unknown setting 'fit-edmd.degree'"),
+        (["fit-edmd", "--set", "nonsense"], 2, "--set stage.key=value"),
+        (["fit-edmd", "--order", "x"], 2, "'--order'"),
+        (["plot"], 2, "orders"),
+        (["fit-edmd", "--order", "-1"], 3, "'fit-edmd.order' must be at least 1"),
+        (["fit-edmd", "--order", "0"], 3, "'fit-edmd.order' must be at least 1"),
+        (["fit-edmd", "--order", "40"], 3, "68,921 functions and 38.0 GB for A alone; the limit is 4,096 functions"),
+        (["fit-edmd", "--order", "6"], 3, "5 values per state"),
+        (["sample", "grid", "--count", "0"], 3, "'sample.count' must be at least 1"),
+        (["sample", "box", "--amplitude", "nan"], 3, "'sample.amplitude' must be a finite number"),
+        (["sample", "box", "--amplitude", "-1"], 3, "'sample.amplitude' must be at least 0"),
+        (["sample", "--seed", "-1"], 3, "'sample.seed' must be at least 0"),
+        (["sample", "--set", "sample.box=[1.0, 2.0]"], 3, "one half-width for each of v_x, v_y, yaw_rate"),
+        (["simulate", "--dt", "0"], 3, "'simulate.dt' must be above 0 s"),
+        (["simulate", "--dt", "nan"], 3, "'simulate.dt' must be a finite number"),
+        (["simulate", "--dt", "inf"], 3, "'simulate.dt' must be a finite number"),
+        (["simulate", "--steps", "0"], 3, "'simulate.steps' must be at least 1"),
+        (["simulate", "--set", "sample.kind=box", "--set", "sample.steps=3", "--steps", "9"], 3, "inputs for 3 steps"),
+        (["evaluate", "--count", "0"], 3, "'test.count' must be at least 1"),
+        (["evaluate", "--steps", "0"], 3, "'test.steps' must be at least 1"),
+        (["evaluate", "--set", "evaluate.first=9"], 3, "'evaluate.first' must be at most the 5 steps"),
+        (["simulate", "--vehicle", "none.toml"], 3, "none.toml: there is no such vehicle file"),
+        (["simulate", "--set", "vehicle.m=-1"], 3, "'vehicle.m' must be above 0 kg"),
+        (["plot", "orders", "-o", "orders.gif"], 3, "unknown ending"),
+        (["simulate", "--vehicle", "ctu"], 4, "unknown vehicle 'ctu': did you mean 'ctu-2020'?"),
+        (["fit-edmd", "simulate/abc"], 4, "koop ls"),
+        (["evaluate", "abc"], 4, "koop ls"),
+        (["plot", "ordres"], 4, "did you mean 'orders'"),
+        (["show", "abc"], 4, "koop ls"),
+        (["ls", "stages"], 4, "fit-edmd"),
+    ],
+)
+def test_bad_input(koop, folder, args, code, part):
+    one_line(koop(*args), code, part)
+    assert not (folder / "artefacts").exists()
+
+
+def test_what_takes_too_much_memory(koop, monkeypatch):
+    from koopcli.simulation import sampling
+
+    def greedy(*args):
+        raise MemoryError("Unable to allocate 1 PiB")
+
+    monkeypatch.setattr(sampling, "box", greedy)
+    one_line(koop("sample", "box"), 3, "not enough memory", "lower the count")
+
+
+def test_a_bad_vehicle_file(koop, folder):
+    (folder / "bad.toml").write_text(BAD_VEHICLE)
+    one_line(koop("fit-edmd", "--set", "vehicle.name=./bad.toml"), 3, "bad.toml", "'parameters.m' must be above 0 kg")
+    assert not (folder / "artefacts").exists()
+
+
+def test_an_unknown_experiment(koop):
+    one_line(koop("fit-edmd", "--experiment", "papre", tiny=False), 4, "did you mean 'paper'")
+
+
+def test_the_wrong_kind_of_artefact(koop):
+    sample = koop("sample").name
+    one_line(koop("evaluate", sample), 4, "is an artefact of stage sample; the PREDICTOR must be of stage fit-edmd")
+    one_line(koop("plot", "orders", sample), 4, "must be of stage evaluate")
+    one_line(koop("show", sample, "--csv"), 4, "no table")
+
+
+def test_a_named_artefact_cannot_be_changed_after_the_fact(koop):
+    predictor = koop("fit-edmd").name
+    one_line(koop("evaluate", predictor, "--set", "vehicle.Jzz=1731"), 2, "vehicle.Jzz cannot change it")
+    one_line(koop("evaluate", "--on", "simulate", "--excitation", "held"), 2, "test.excitation cannot change it")
+
+
+def test_an_ambiguous_name_lists_the_candidates(koop):
+    names = {koop("sample", "--seed", str(seed)).name for seed in (1, 2)}
+    result = koop("simulate", "sample")
+    one_line(result, 4, "ambiguous", *names)
+
+
+def test_a_simulation_that_overflows(koop):
+    one_line(koop("simulate", "--set", "sample.kind=box", "--set", "sample.amplitude=1e300"), 3, "lower simulate.dt")
+
+
+def test_a_damaged_artefact_is_rebuilt_with_a_warning_or_refused(koop, folder):
+    predictor = koop("fit-edmd").name
+    path = folder / koop("path", predictor).name
+    path.write_bytes(path.read_bytes()[:-1])
+    rebuilt = koop("evaluate", predictor)
+    assert rebuilt.code == 0
+    assert "warning: the object of" in rebuilt.err
+    assert list((folder / "artefacts" / "quarantine").iterdir())
+    path.write_bytes(b"")
+    for record in (folder / "artefacts" / "records" / "simulate").iterdir():
+        record.unlink()
+    one_line(koop("show", predictor), 5, "cannot be made again")
+
+
+def test_a_damaged_record_is_put_aside(koop, folder):
+    name = koop("fit-edmd").name
+    (record,) = (folder / "artefacts" / "records" / "fit-edmd").iterdir()
+    record.write_text(record.read_text().replace('"order": 2', '"order": 3'))
+    again = koop("fit-edmd")
+    assert again.code == 0
+    assert again.name == name
+    assert "damaged and was put aside" in again.err
+
+
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS, errno.EACCES])
+def test_storage_that_fails(koop, folder, monkeypatch, code):
+    real = os.open
+
+    def failing(path, flags, *args, **kwargs):
+        if flags & os.O_CREAT and "artefacts/tmp" in str(path):
+            raise OSError(code, os.strerror(code))
+        return real(path, flags, *args, **kwargs)
+
+    monkeypatch.setattr(os, "open", failing)
+    one_line(koop("sample"), 6, os.strerror(code), "needed", "free", "--store")
+    assert not list((folder / "artefacts" / "tmp").iterdir())
+
+
+def test_a_read_only_store_still_serves_hits(koop, folder, monkeypatch):
+    name = koop("fit-edmd").name
+
+    def refuse(*args, **kwargs):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    for call in ("replace", "mkdir", "write", "fsync"):
+        monkeypatch.setattr(os, call, refuse)
+    assert koop("fit-edmd").name == name
+    assert koop("show", name).code == 0
+
+
+def test_an_unwritable_picture(koop):
+    one_line(koop("plot", "orders", "-o", "no/such/folder/x.png"), 6, "no/such/folder")
+
+
+def test_a_store_that_is_a_file(koop, folder):
+    (folder / "x").write_text("")
+    one_line(koop("sample", "--store", "x"), 6, "not a folder")
+
+
+def test_a_lock_that_is_held(koop, folder, monkeypatch):
+    monkeypatch.setenv("KOOP_LOCK_TIMEOUT", "0.05")
+    koop("sample")
+    (record,) = (folder / "artefacts" / "records" / "sample").iterdir()
+    record.unlink()
+    with FileLock(folder / "artefacts" / "locks" / f"{record.stem}.lock"):
+        one_line(koop("sample"), 7, "another process")
+
+
+def test_a_newer_format(koop, folder):
+    koop("sample")
+    (record,) = (folder / "artefacts" / "records" / "sample").iterdir()
+    record.write_text(json.dumps({**json.loads(record.read_text()), "schema": 2}))
+    one_line(koop("sample"), 8, "update koop")
+
+
+def test_an_internal_error_is_the_only_traceback(monkeypatch, folder):
+    from koopcli.simulation import sampling
+
+    def broken(*args):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(sampling, "grid", broken)
+    with pytest.raises(ZeroDivisionError):
+        main(["sample"])

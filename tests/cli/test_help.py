@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+from koopcli.cli.app import app
+from koopcli.cli.reference import reference
+
+ROOT = Path(__file__).parents[2]
+COMMANDS = typer.main.get_command(app).commands
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help_with_an_example_and_every_option_says_what_it_is(name):
+    command = COMMANDS[name]
+    assert "Example: " in command.help
+    for parameter in command.params:
+        assert parameter.help, f"{name} {parameter.name}"
+
+
+def test_the_command_reference_is_up_to_date():
+    written = (ROOT / "docs" / "cli.md").read_text()
+    assert written == reference(), "run: make docs"
+
+
+def test_the_readme_and_the_docs_know_every_command():
+    text = (ROOT / "README.md").read_text()
+    for name in COMMANDS:
+        assert f"koop {name}" in text
+
+
+def test_help_needs_no_numerics():
+    code = (
+        "import sys; from koopcli.__main__ import main; main(['--help']); "
+        "print(sorted({'numpy', 'scipy', 'h5py', 'matplotlib', 'filelock'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("[]\n")
+
+
+def test_a_fit_needs_no_pictures(folder):
+    code = (
+        "import sys; from koopcli.__main__ import main; "
+        "main(['fit-edmd', '--experiment', '../tiny.toml']); print('matplotlib' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("False\n")
+
+
+def test_version_and_module():
+    done = subprocess.run([sys.executable, "-m", "koopcli", "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("koop ")
+
+
+def test_names_complete(koop, monkeypatch):
+    from koopcli.cli.options import complete_name
+
+    name = koop("sample").name
+    assert complete_name("sam") == [name]
+    assert complete_name("fit") == []

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import json
+import re
+
+from koopcli.config.data import data_folder
+
+
+def test_the_table_the_report_and_the_pins(koop, folder):
+    done = koop("reproduce", "edmd")
+    assert done.code == 0
+    report = folder / done.name
+    text = report.read_text()
+    for part in ("paper", "11.1 %", "unstated inputs", "random draw", "even draw", f"]({report.stem}.png)"):
+        assert part in text
+    assert "Paper versus here" in done.err
+    assert "No parameter was chosen" in done.err
+    assert report.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+    for name in re.findall(r"evaluate/[0-9a-f]{12}", text):
+        assert koop("path", name).code == 0
+    pinned = {row["name"] for row in json.loads(koop("ls", "evaluate", "--json").out) if row["pinned"]}
+    assert pinned == set(re.findall(r"evaluate/[0-9a-f]{12}", text))
+    assert len(pinned) == 2 * 2 * 2
+
+
+def test_again_from_the_store_without_a_write(koop, folder):
+    first = koop("reproduce")
+    before = {path: path.stat().st_mtime_ns for path in (folder / "artefacts").rglob("*")}
+    again = koop("reproduce")
+    assert again.out == first.out
+    assert "made in" not in again.err
+    assert {path: path.stat().st_mtime_ns for path in (folder / "artefacts").rglob("*")} == before
+
+
+def test_one_changed_assumption_beside_the_unmodified_run(koop, folder):
+    plain = koop("reproduce", "--json")
+    both = json.loads(koop("reproduce", "--set", "vehicle.Jzz=1731", "--json").out)
+    assert [run["run"] for run in both["runs"]] == ["here", "vehicle.Jzz=1731"]
+    assert both["runs"][0]["evaluations"] == json.loads(plain.out)["runs"][0]["evaluations"]
+    here, changed = (run["evaluations"] for run in both["runs"])
+    assert len(here) == len(changed) == 8
+    assert all(a["rmse"] != b["rmse"] for a, b in zip(here, changed, strict=True))
+    text = (folder / both["path"]).read_text()
+    assert "vehicle.Jzz=1731" in text
+
+
+def test_the_figures_of_the_report_are_those_of_evaluate(koop):
+    runs = json.loads(koop("reproduce", "--json").out)["runs"]
+    (cell,) = [c for c in runs[0]["evaluations"] if (c["draw"], c["order"], c["excitation"]) == ("even", 2, "none")]
+    alone = koop("evaluate", "--json", "--set", "sample.draw=even", "--excitation", "none", "--set", "fit-edmd.order=2")
+    assert json.loads(alone.out)["rmse"] == cell["rmse"]
+    assert json.loads(alone.out)["name"] == cell["name"]
+
+
+def test_what_is_swept_cannot_be_set(koop):
+    for text in ("fit-edmd.order=3", "sample.draw=even", "test.excitation=held"):
+        done = koop("reproduce", "--set", text)
+        assert done.code == 2
+        assert "--set 'reproduce." in done.err
+    assert koop("reproduce", "--set", "reproduce.orders=[1]", "--set", 'reproduce.draws=["even"]').code == 0
+
+
+def test_dry_run_and_smoke(koop, folder):
+    plan = json.loads(koop("reproduce", "--smoke", "--dry-run", "--json", tiny=False).out)
+    assert sum(step["name"].startswith("evaluate") for step in plan["steps"]) == 4 * 2 * 3
+    assert sum(step["name"].startswith("sample") for step in plan["steps"]) == 2 + 3
+    assert not (folder / "artefacts").exists()
+    assert koop("reproduce", "--smoke").code == 2  # with an experiment of its own
+    assert (data_folder() / "experiments" / "smoke.toml").is_file()

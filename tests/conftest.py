@@ -1,0 +1,126 @@
+"""Fixtures: the command line in this process, a store in a folder of its own, small data."""
+
+from __future__ import annotations
+
+import signal
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from koopcli.__main__ import main
+from koopcli.checks import COMMAND_LINE
+from koopcli.config.data import locate
+from koopcli.records import Sample, Trajectories
+from koopcli.simulation import sampling
+from koopcli.simulation.integrate import simulate
+from koopcli.store import Store
+from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
+from koopcli.vehicles.single_track import ForceInput
+
+TINY = """
+[sample]
+count = 5
+columns = 2
+[fit-edmd]
+order = 2
+[test]
+count = 40
+steps = 5
+[evaluate]
+chunk = 10
+[reproduce]
+orders = [1, 2]
+excitations = ["none", "fresh"]
+"""
+
+
+@dataclass(frozen=True)
+class Result:
+    code: int
+    out: str
+    err: str
+
+    @property
+    def name(self) -> str:
+        return self.out.strip()
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Path:
+    """An empty working folder with an experiment `tiny.toml` beside it."""
+    (tmp_path / "tiny.toml").write_text(TINY)
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
+    monkeypatch.delenv("KOOP_STORE", raising=False)
+    return work
+
+
+@pytest.fixture
+def koop(folder, capsys):
+    """Run the command line here; `tiny=True` uses the tiny experiment."""
+
+    def run(*args: str, tiny: bool = True) -> Result:
+        making = args and args[0] in ("sample", "simulate", "fit-edmd", "evaluate", "plot", "reproduce")
+        extra = ["--experiment", "../tiny.toml"] if tiny and making else []
+        capsys.readouterr()
+        before = signal.getsignal(signal.SIGTERM)
+        try:
+            code = main([*args, *extra])
+        finally:
+            signal.signal(signal.SIGTERM, before)
+        captured = capsys.readouterr()
+        return Result(code, captured.out, captured.err)
+
+    return run
+
+
+@pytest.fixture
+def store(tmp_path) -> Store:
+    return Store(tmp_path / "store")
+
+
+@pytest.fixture(scope="session")
+def vehicle() -> VehicleParameters:
+    return read_vehicle(locate("vehicles", "ctu-2020", "vehicle"))
+
+
+@pytest.fixture(scope="session")
+def plant(vehicle) -> ForceInput:
+    return ForceInput(vehicle)
+
+
+@pytest.fixture(scope="session")
+def lopsided(vehicle) -> ForceInput:
+    """A vehicle whose axles differ, with more drag."""
+    return ForceInput(change(vehicle, {"l_f": 1.1, "l_r": 1.6, "c_w": 0.4}, COMMAND_LINE))
+
+
+def trajectories_of(plant: ForceInput, sample: Sample, steps: int, dt: float = 0.01) -> Trajectories:
+    x0, u = sample.expand(steps)
+    x = simulate(plant.rhs, x0, u, dt)
+    return Trajectories(x, u, dt, plant.states, plant.inputs, sample.product)
+
+
+def grid_sample(count: int = 15, draw: str = "random", seed: int = 0, columns: int = 15) -> Sample:
+    factors, u = sampling.grid(seed, (30.0, 30.0, 10.0), count, draw, (1.0, 5.0, 10.0, 100.0), columns, 4)
+    return Sample(factors, np.empty((0, 3)), u, True, ForceInput.states, ForceInput.inputs)
+
+
+def box_sample(count: int = 3375, excitation: str = "fresh", steps: int = 30) -> Sample:
+    x0, u = sampling.box(7, (30.0, 30.0, 10.0), count, excitation, 1e4, steps, 4)
+    return Sample((), x0, u, False, ForceInput.states, ForceInput.inputs)
+
+
+def read_all(root: Path) -> int:
+    """Read and verify every artefact of a store; returns how many there are."""
+    from koopcli.stages.registry import STAGES
+
+    shelf = Store(root)
+    for stage, key in shelf.index():
+        record = shelf.record(stage, key)
+        assert record is not None, f"damaged record {stage}/{key}"
+        STAGES[stage].unpack(shelf.read(record))
+    return len(shelf.index())

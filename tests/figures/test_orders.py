@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from koopcli.config.settings import ImageFormat
+from koopcli.figures.orders import OrderErrors, draw, drawing
+
+
+def curve(draw="random 0", excitation="fresh"):
+    order = np.arange(1, 6)
+    return OrderErrors(draw, excitation, order, 40.0 / order**2, 30.0 / order**2, 90.0 / order**2)
+
+
+def lines(figure):
+    return {line.get_label(): line for line in figure.axes[0].lines}
+
+
+def test_one_curve_shows_mean_median_and_maximum_and_the_paper():
+    figure = draw([curve()])
+    found = lines(figure)
+    assert set(found) == {"mean", "median", "maximum", "paper's best (11.1 %)"}
+    assert found["mean"].get_ydata() == pytest.approx(curve().mean)
+    assert found["paper's best (11.1 %)"].get_xydata().tolist() == [[6, 11.1], [7, 11.1]]
+    axes = figure.axes[0]
+    assert axes.get_yscale() == "log"
+    assert "(%)" in axes.get_ylabel()
+    assert "order" in axes.get_xlabel()
+
+
+def test_several_curves_are_told_apart():
+    figure = draw([curve(), curve("even 0"), curve(excitation="held")])
+    found = lines(figure)
+    assert {"random 0, fresh inputs", "even 0, fresh inputs", "random 0, held inputs"} < set(found)
+    assert len({line.get_color() for line in found.values()}) == 4
+
+
+@pytest.mark.parametrize("image", ImageFormat.__args__)
+def test_the_same_numbers_give_the_same_bytes(image):
+    assert drawing([curve()], image).image == drawing([curve()], image).image
+
+
+def test_the_numbers_come_along():
+    numbers = drawing([curve()], "svg").numbers
+    assert numbers["random 0 fresh/mean"].values == pytest.approx(curve().mean)
+    assert numbers["random 0 fresh/mean"].units == "%"
+
+
+def test_nothing_global_is_left_behind():
+    import matplotlib as mpl
+
+    before = dict(mpl.rcParams)
+    drawing([curve()], "png")
+    assert dict(mpl.rcParams) == before

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from koopcli.errors import InvalidValueError
+from koopcli.koopman import edmd
+from koopcli.koopman.evaluation import Evaluation, evaluate, join
+from tests.conftest import box_sample, grid_sample, trajectories_of
+
+
+@pytest.fixture(scope="module")
+def pair(plant):
+    data = trajectories_of(plant, grid_sample(count=7, columns=3), 1)
+    predictor = edmd.fit(data, edmd.basis_from_data(data, "tensor", 3))
+    return predictor, trajectories_of(plant, box_sample(50, steps=8), 8)
+
+
+def test_parts_join_to_the_whole(pair):
+    whole = evaluate(*pair, slice(None), 1)
+    parts = join([evaluate(*pair, slice(i, i + 13), 1) for i in range(0, 50, 13)])
+    assert parts.rmse == pytest.approx(whole.rmse, rel=1e-12)
+    assert parts.rmse_relift == pytest.approx(whole.rmse_relift, rel=1e-12)
+    assert parts.pack().meta == whole.pack().meta
+    again = Evaluation.unpack(whole.pack())
+    assert again.figures() == whole.figures()
+
+
+def test_relifting_is_the_rolled_one_step_predictor(pair):
+    predictor, test = pair
+    x = [test.x[:, 0]]
+    for k in range(8):
+        x.append(predictor.predict(x[-1], test.u[:, k : k + 1])[:, 1])
+    error = np.sqrt(((np.stack(x, axis=1) - test.x)[:, 1:] ** 2).sum((1, 2)))
+    expected = 100 * error / np.sqrt((test.x[:, 1:] ** 2).sum((1, 2)))
+    assert evaluate(predictor, test, slice(None), 1).rmse_relift == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_diverged_prediction_is_counted_and_left_out(pair):
+    predictor, test = pair
+    wild = replace(predictor, A=1e6 * predictor.A)
+    figures = evaluate(wild, test, slice(None), 1).figures()
+    assert figures["diverged"] == 50
+    assert np.isnan(figures["rmse"]["mean"])
+    u = np.array(test.u)
+    u[3] = 1e300
+    figures = evaluate(predictor, replace(test, u=u), slice(None), 1).figures()
+    assert figures["diverged"] == 1
+    assert np.isfinite(figures["rmse"]["max"])
+
+
+def test_what_does_not_fit_is_refused(pair):
+    predictor, test = pair
+    with pytest.raises(InvalidValueError, match=r"steps by 0\.01 s, the trajectories by 0\.02 s"):
+        evaluate(predictor, replace(test, dt=0.02), slice(None), 1)
+    with pytest.raises(InvalidValueError, match="at most 8 steps"):
+        evaluate(predictor, test, slice(None), 9)
+    with pytest.raises(InvalidValueError, match="different states"):
+        evaluate(replace(predictor, state_channels=predictor.input_channels), test, slice(None), 1)
+
+
+def test_the_table_has_a_row_for_each_trajectory(pair):
+    evaluation = evaluate(*pair, slice(None), 1)
+    header, rows = evaluation.table()
+    assert len(rows) == 50
+    assert all(len(row) == len(header) for row in rows)
+    assert rows[7][header.index("rmse (%)")] == evaluation.rmse[7]

@@ -1,0 +1,225 @@
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from koopcli.config.experiment import load_experiment, parse_set
+from koopcli.errors import DamagedArtefactError, UnknownNameError
+from koopcli.koopman import evaluation
+from koopcli.progress import silent
+from koopcli.stages import pipeline, recipes
+from koopcli.stages.pipeline import Pipeline
+from koopcli.stages.registry import STAGES
+from koopcli.store import Store
+
+SMALL = ["sample.count=5", "sample.columns=2", "fit-edmd.order=2", "test.count=40", "test.steps=5", "evaluate.chunk=10"]
+
+
+class Listener:
+    """A reporter that remembers."""
+
+    def __init__(self):
+        self.notes, self.warnings = [], []
+
+    def note(self, text):
+        self.notes.append(text)
+
+    def warn(self, text):
+        self.warnings.append(text)
+
+    @contextmanager
+    def progress(self, label):
+        yield silent
+
+    def made(self):
+        return [note.partition("/")[0] for note in self.notes if " made in " in note]
+
+
+def experiment(*assignments):
+    return load_experiment("paper", parse_set([*SMALL, *assignments]))
+
+
+@pytest.fixture
+def fresh(store):
+    """A new pipeline on the same store, as a new process would have."""
+
+    def make():
+        listener = Listener()
+        return Pipeline(Store(store.root, listener.warn), listener), listener
+
+    return make
+
+
+def test_made_once_and_found_again(fresh):
+    line, heard = fresh()
+    made = line.make(recipes.evaluation(experiment()))
+    assert heard.made() == ["sample", "simulate", "fit-edmd", "sample", "simulate", "evaluate"]
+    assert not made.cached
+    line, heard = fresh()
+    found = line.make(recipes.evaluation(experiment()))
+    assert found.cached
+    assert found.record == made.record
+    assert heard.notes == [f"{made.record.name:<24} reused"]
+    assert found.figures == made.figures
+
+
+def test_a_change_upstream_makes_only_what_depends_on_it(fresh):
+    fresh()[0].make(recipes.evaluation(experiment()))
+    line, heard = fresh()
+    line.make(recipes.evaluation(experiment("fit-edmd.order=1")))
+    assert heard.made() == ["fit-edmd", "evaluate"]
+    line, heard = fresh()
+    line.make(recipes.evaluation(experiment("vehicle.Jzz=1731")))
+    assert heard.made() == ["simulate", "fit-edmd", "simulate", "evaluate"]
+
+
+def test_names_and_paths_are_not_part_of_a_recipe(fresh, tmp_path):
+    from koopcli.config.data import data_folder
+
+    one = fresh()[0].make(recipes.simulation(experiment()))
+    copy = tmp_path / "the-same.toml"
+    copy.write_text((data_folder() / "vehicles" / "ctu-2020.toml").read_text())
+    two = fresh()[0].make(recipes.simulation(experiment(f"vehicle.name={copy}")))
+    assert two.cached
+    assert two.record == one.record
+
+
+def test_a_hit_writes_nothing_and_needs_nothing_upstream(fresh, store):
+    made = fresh()[0].make(recipes.evaluation(experiment()))
+    for upstream in ("sample", "simulate", "fit-edmd"):
+        for stage, key in store.index():
+            if stage == upstream:
+                store.path(store.record(stage, key)).unlink(missing_ok=True)
+    before = {path: path.stat().st_mtime_ns for path in store.root.rglob("*")}
+    assert fresh()[0].make(recipes.evaluation(experiment())).record == made.record
+    assert {path: path.stat().st_mtime_ns for path in store.root.rglob("*")} == before
+
+
+def test_a_damaged_object_is_put_aside_and_made_again(fresh, store):
+    made = fresh()[0].make(recipes.fit_edmd(experiment()))
+    path = store.path(made.record)
+    good = path.read_bytes()
+    path.write_bytes(good[:-1] + bytes([good[-1] ^ 1]))
+    line, heard = fresh()
+    again = line.make(recipes.evaluation(experiment()))
+    assert any("damaged and was put aside" in text for text in heard.warnings)
+    assert path.read_bytes() == good
+    assert list((store.root / "quarantine").iterdir())
+    assert not again.cached
+
+
+def test_a_named_artefact_is_rebuilt_from_its_recipe_or_refused(fresh, store):
+    made = fresh()[0].make(recipes.fit_edmd(experiment()))
+    store.path(made.record).write_bytes(b"")
+    line, heard = fresh()
+    assert line.make(line.named(made.record.name)).record.key == made.record.key
+    assert heard.made() == ["fit-edmd"]
+    store.path(made.record).write_bytes(b"")
+    (path,) = (store.root / "records" / "simulate").glob("*.json")
+    path.unlink()
+    line, _ = fresh()
+    with pytest.raises(DamagedArtefactError, match="cannot be made again"):
+        line.make(line.named(made.record.name))
+
+
+def test_a_named_artefact_of_an_older_version_is_used_as_it_is(fresh, store, monkeypatch):
+    made = fresh()[0].make(recipes.fit_edmd(experiment()))
+    monkeypatch.setitem(STAGES, "fit-edmd", replace(STAGES["fit-edmd"], version=2))
+    line, heard = fresh()
+    line.make(recipes.evaluation(experiment(), line.named(made.record.name)))
+    assert "fit-edmd" not in heard.made()
+    line, heard = fresh()
+    line.make(recipes.fit_edmd(experiment()))
+    assert heard.made() == ["fit-edmd"]
+    store.path(made.record).write_bytes(b"")
+    line, _ = fresh()
+    with pytest.raises(DamagedArtefactError, match="another version"):
+        line.make(line.named(made.record.name))
+
+
+def test_the_lineage_that_is_gone_is_named(fresh, store):
+    made = fresh()[0].make(recipes.fit_edmd(experiment()))
+    (path,) = (store.root / "records" / "simulate").glob("*.json")
+    path.unlink()
+    line, _ = fresh()
+    with pytest.raises(UnknownNameError, match="simulate stage behind"):
+        recipes.test_set(experiment(), line.named(made.record.name))
+
+
+def test_an_interrupted_evaluation_goes_on_where_it_stopped(fresh, monkeypatch):
+    whole = fresh()[0].make(recipes.evaluation(experiment("evaluate.first=2", "evaluate.chunk=9")))
+    real, calls = evaluation.evaluate, []
+
+    def interrupt(predictor, trajectories, rows, first):
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        calls.append(rows)
+        return real(predictor, trajectories, rows, first)
+
+    from koopcli.stages import evaluate as stage
+
+    monkeypatch.setattr(stage, "evaluate", interrupt)
+    task = recipes.evaluation(experiment())
+    with pytest.raises(KeyboardInterrupt):
+        fresh()[0].make(task)
+    calls.clear()
+    line, heard = fresh()
+    resumed = line.make(task)
+    assert calls == [slice(30, 40)]
+    assert "3 of 4 chunks were already there" in heard.notes
+    assert not list((line.store.root / "partial").iterdir())
+    monkeypatch.setattr(stage, "evaluate", real)
+    straight = Pipeline(Store(line.store.root.parent / "other"), Listener()).make(task)
+    assert straight.record.object == resumed.record.object
+    assert whole.record.key != resumed.record.key
+
+
+def test_another_process_may_have_made_it_meanwhile(fresh, monkeypatch):
+    """What appears between the look and the lock is used."""
+    task = recipes.sample(experiment().sample)
+    line, _ = fresh()
+    real = line.store.lock
+
+    @contextmanager
+    def late(key, name):
+        with real(key, name):
+            pass
+        fresh()[0].make(task)
+        with real(key, name):
+            yield
+
+    monkeypatch.setattr(line.store, "lock", late)
+    assert line.make(task).cached
+
+
+def test_the_plan_says_what_making_does(fresh):
+    task = recipes.evaluation(experiment())
+    line, _ = fresh()
+    before = line.plan(task)
+    assert [step.state for step in before] == ["make"] * 6
+    assert sum(step.cost.bytes for step in before) > 0
+    assert not line.store.root.exists()
+    fresh()[0].make(recipes.fit_edmd(experiment()))
+    states = {step.name.partition("/")[0]: step.state for step in fresh()[0].plan(task)}
+    assert states["fit-edmd"] == "reuse"
+    assert states["evaluate"] == "make"
+    fresh()[0].make(task)
+    assert [step.state for step in fresh()[0].plan(task)] == ["reuse"]
+
+
+def test_records_hold_where_they_came_from(fresh):
+    record = fresh()[0].make(recipes.fit_edmd(experiment())).record
+    assert record.lineage["trajectories"].startswith("simulate/")
+    assert record.recipe["settings"] == {"order": 2, "basis": "tensor"}
+    assert {"time", "host", "versions", "argv", "seconds", "peak_memory_mb", "git"} <= set(record.provenance)
+
+
+def test_the_key_is_in_no_way_random(fresh, tmp_path):
+    one = fresh()[0].make(recipes.sample(experiment().sample)).record
+    two = Pipeline(Store(tmp_path / "elsewhere"), Listener()).make(recipes.sample(experiment().sample)).record
+    assert (one.key, one.object, one.data) == (two.key, two.object, two.data)
+    assert pipeline.SCHEMA == 1
+    assert np.isfinite(one.size)

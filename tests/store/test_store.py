@@ -1,0 +1,274 @@
+from __future__ import annotations
+
+import errno
+import json
+import os
+
+import numpy as np
+import pytest
+from filelock import FileLock
+
+from koopcli.errors import DamagedArtefactError, LockTimeoutError, NewerFormatError, StorageError, UnknownNameError
+from koopcli.records import Array, Packed
+from koopcli.store import Store, image
+from koopcli.store.files import make_folder, publish, size_text, sweep
+from koopcli.store.identity import SCHEMA
+from koopcli.store.pins import pin, pins, unpin
+from koopcli.store.store import store_root
+
+
+def packed(value=1.0, n=4) -> Packed:
+    return Packed({"x": Array(np.full(n, value), ("row",), "m")}, {"value": value})
+
+
+def recipe(seed=0, stage="sample"):
+    return {"schema": SCHEMA, "stage": stage, "version": 1, "settings": {"seed": seed, "width": 0.1}, "inputs": {}}
+
+
+def commit(store, seed=0, value=1.0, stage="sample"):
+    return store.commit(recipe(seed, stage), {}, packed(value), {"time": "2026-01-01", "seconds": 0.0})
+
+
+def test_committed_and_read_again(store):
+    made = commit(store)
+    found = Store(store.root).record("sample", made.key)
+    assert found == made
+    assert found.name == f"sample/{made.key[:12]}"
+    assert (Store(store.root).read(found).arrays["x"].values[...] == 1).all()
+    assert store.record("sample", "0" * 64) is None
+
+
+def test_equal_content_is_stored_once(store):
+    one, two = commit(store, 1), commit(store, 2)
+    assert one.key != two.key
+    assert store.path(one) == store.path(two)
+
+
+def test_names_resolve_by_any_unambiguous_beginning(store):
+    records = [commit(store, seed) for seed in range(20)] + [commit(store, 0, stage="simulate")]
+    one = records[3]
+    for text in (one.name, one.key, f"sample/{one.key}", "simulate"):
+        assert store.find(text).stage in ("sample", "simulate")
+    assert store.find(one.name) == one
+    with pytest.raises(UnknownNameError, match=r"'sample' is ambiguous: .* and 12 more"):
+        store.find("sample")
+    for unknown in ("plot", "zzz", ""):
+        with pytest.raises(UnknownNameError, match="koop ls"):
+            store.find(unknown)
+
+
+@pytest.mark.parametrize("where", [0, 8, 500, -1])
+def test_a_flipped_bit_is_found_and_the_object_put_aside(store, where):
+    record = commit(store)
+    path = store.path(record)
+    content = bytearray(path.read_bytes())
+    content[where] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(DamagedArtefactError, match="put aside"):
+        store.read(record)
+    assert not path.exists()
+    assert (store.root / "quarantine" / path.name).read_bytes() == content
+    with pytest.raises(DamagedArtefactError, match="missing"):
+        store.read(record)
+    assert not store.has_object(record)
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_large_content_goes_through_a_file(store, monkeypatch, large):
+    if large:
+        monkeypatch.setattr(image, "MEMORY_LIMIT", 100)
+    record = store.commit(recipe(), {}, packed(n=10_000), {})
+    assert store.path(record).stem == record.object
+    assert (store.read(record).arrays["x"].values[...] == 1).all()
+    assert not list((store.root / "tmp").iterdir())
+    content = bytearray(store.path(record).read_bytes())
+    content[-1] ^= 1
+    store.path(record).write_bytes(content)
+    with pytest.raises(DamagedArtefactError):
+        store.read(record)
+
+
+def test_every_byte_of_a_record_is_guarded(store):
+    record = commit(store)
+    path = store.root / "records" / "sample" / f"{record.key}.json"
+    good = path.read_bytes()
+    for where in range(0, len(good), 7):
+        bad = bytearray(good)
+        bad[where] ^= 1
+        path.write_bytes(bad)
+        warned = []
+        try:
+            found = Store(store.root, warned.append).record("sample", record.key)
+        except NewerFormatError:
+            assert b'"schema"' in good[max(0, where - 12) : where + 12]  # 1 became a higher number
+            continue
+        if found is None:
+            assert "put aside" in warned[0]
+        else:
+            assert found == record  # white space
+    path.write_bytes(good[: len(good) // 2])
+    assert Store(store.root).record("sample", record.key) is None
+
+
+def test_a_record_under_another_key_is_refused(store):
+    record = commit(store)
+    folder = store.root / "records" / "sample"
+    os.rename(folder / f"{record.key}.json", folder / f"{'0' * 64}.json")
+    assert store.record("sample", "0" * 64) is None
+
+
+def test_a_newer_record_is_left_alone(store):
+    record = commit(store)
+    path = store.root / "records" / "sample" / f"{record.key}.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "schema": SCHEMA + 1}))
+    with pytest.raises(NewerFormatError, match="update koop"):
+        store.record("sample", record.key)
+    assert path.exists()
+
+
+CALLS = ("open", "write", "fsync", "replace")
+
+
+@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EIO, errno.EROFS])
+def test_an_error_at_any_write_leaves_the_old_state_or_the_new(store, monkeypatch, call, code):
+    """Fail the n-th call of each kind, for every n of a commit: no half state, and the next try succeeds."""
+    old = commit(store, 1)
+    real, n = getattr(os, call), 0
+    for n in range(1, 30):
+        count = 0
+
+        def failing(*args, **kwargs):
+            nonlocal count
+            count += 1
+            if count == n:
+                raise OSError(code, os.strerror(code))
+            return real(*args, **kwargs)
+
+        monkeypatch.setattr(os, call, failing)
+        failed = False
+        try:
+            commit(store, 2, value=2.0)
+        except StorageError as error:
+            failed = True
+            assert "--store" in str(error)
+        monkeypatch.setattr(os, call, real)
+        shelf = Store(store.root)
+        shelf.read(shelf.record("sample", old.key))
+        for stage, key in shelf.index():
+            record = shelf.record(stage, key)
+            shelf.read(record)
+            if key != old.key:
+                (store.root / "records" / stage / f"{key}.json").unlink()
+        if not failed:
+            break
+    assert n > 1, "the call is never made"
+    assert not failed
+    commit(store, 2, value=2.0)
+
+
+def test_a_full_disk_says_what_was_needed(store, monkeypatch):
+    def full(*args):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "write", full)
+    with pytest.raises(StorageError, match=r"No space left on device \(80\.0 kB needed, .* free\)"):
+        store.commit(recipe(), {}, packed(n=10_000), {})
+    assert not list((store.root / "tmp").iterdir())
+
+
+def test_a_store_that_is_a_file_is_refused(tmp_path):
+    (tmp_path / "x").write_text("")
+    with pytest.raises(StorageError, match="not a folder"):
+        Store(tmp_path / "x")
+
+
+def test_a_held_lock_times_out(store, monkeypatch):
+    monkeypatch.setenv("KOOP_LOCK_TIMEOUT", "0.1")
+    warned = []
+    shelf = Store(store.root, warned.append)
+    make_folder(store.root / "locks")
+    with FileLock(store.root / "locks" / "abc.lock"):
+        with pytest.raises(LockTimeoutError, match="KOOP_LOCK_TIMEOUT"), shelf.lock("abc", "sample/abc"):
+            pass
+        assert "waiting" in warned[0]
+    with shelf.lock("abc", "sample/abc"):
+        pass
+
+
+@pytest.mark.parametrize("error", [NotImplementedError(), OSError(errno.ENOLCK, "No locks available")])
+def test_a_file_system_without_locks_is_a_warning(store, monkeypatch, error):
+    def refuse(self, *args, **kwargs):
+        raise error
+
+    monkeypatch.setattr(FileLock, "acquire", refuse)
+    warned = []
+    with Store(store.root, warned.append).lock("abc", "sample/abc"):
+        pass
+    assert "twice" in warned[0]
+
+
+def test_parts_are_verified_and_cleared(store):
+    parts = store.parts("k" * 64)
+    assert parts.read(0) is None
+    parts.commit(0, packed(1.0))
+    parts.commit(10, packed(2.0))
+    assert parts.read(0).meta["value"] == 1.0
+    assert parts.read(1) is None
+    (path,) = (store.root / "partial").rglob("10-*.h5")
+    path.write_bytes(path.read_bytes()[:-1])
+    assert parts.read(10) is None
+    parts.clear()
+    assert not (store.root / "partial" / ("k" * 64)).exists()
+
+
+def test_pins(store):
+    one, two = commit(store, 1), commit(store, 2)
+    pin(store, "both", [one, two])
+    assert pins(store) == {"both": sorted([f"sample/{one.key}", f"sample/{two.key}"])}
+    before = (store.root / "refs" / "both.json").stat().st_mtime_ns
+    pin(store, "both", [two, one])
+    assert (store.root / "refs" / "both.json").stat().st_mtime_ns == before
+    unpin(store, "both")
+    assert pins(store) == {}
+    with pytest.raises(UnknownNameError, match="not pinned"):
+        unpin(store, "both")
+
+
+def test_litter_of_dead_processes_is_swept_by_the_file_systems_clock(tmp_path):
+    import socket
+
+    host = socket.gethostname()
+    names = {"gone": f"4194304-aa@{host}", "mine": f"{os.getpid()}-bb@{host}", "elsewhere": "1-cc@another"}
+    for name in names.values():
+        (tmp_path / name).write_text("")
+    now = (tmp_path / names["gone"]).stat().st_mtime
+    sweep(tmp_path, now + 60)
+    assert len(list(tmp_path.iterdir())) == 3
+    sweep(tmp_path, now + 7200)
+    assert {p.name for p in tmp_path.iterdir()} == {names["mine"], names["elsewhere"]}
+    sweep(tmp_path, now + 100_000)
+    assert not list(tmp_path.iterdir())
+
+
+def test_publish_never_leaves_half_a_file(tmp_path):
+    def break_off(path):
+        path.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        publish(tmp_path / "x", break_off, tmp_path / "tmp")
+    assert not (tmp_path / "x").exists()
+    assert not list((tmp_path / "tmp").iterdir())
+
+
+def test_where_the_store_is(monkeypatch, tmp_path):
+    monkeypatch.delenv("KOOP_STORE", raising=False)
+    assert str(store_root()) == "artefacts"
+    monkeypatch.setenv("KOOP_STORE", str(tmp_path))
+    assert store_root() == tmp_path
+    assert str(store_root("here")) == "here"
+
+
+def test_sizes_for_people():
+    assert [size_text(n) for n in (0, 999, 1500, 2.5e9)] == ["0 B", "999 B", "1.5 kB", "2.5 GB"]
