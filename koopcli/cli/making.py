@@ -38,7 +38,7 @@ TEST_SECTIONS = ("test", "evaluate")
 def sample(
     kind: Annotated[
         Kind | None,
-        typer.Argument(metavar=f"[{names(Kind)}]", help="grid: the EDMD dataset (the default); box: test states."),
+        typer.Argument(metavar=names(Kind), help="grid: the EDMD dataset (the default); box: test states."),
     ] = None,
     seed: SeedOption = None,
     count: Annotated[

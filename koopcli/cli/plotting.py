@@ -22,7 +22,7 @@ def plot(
     figure: Annotated[str | None, typer.Argument(help="Name of the figure; --list shows them.")] = None,
     artefacts: Annotated[
         list[str] | None,
-        typer.Argument(autocompletion=complete_name, metavar="[ARTEFACT]...", help="What to draw; made when left out."),
+        typer.Argument(autocompletion=complete_name, metavar="ARTEFACT", help="What to draw; made when left out."),
     ] = None,
     output: Annotated[
         Path | None,

@@ -42,7 +42,8 @@ def _command(name: str, command: Any) -> Iterator[str]:
 
 def _metavar(parameter: Any) -> str:
     text = parameter.metavar or parameter.name.upper()
-    return text if text.startswith("[") or parameter.required else f"[{text}]"
+    text += " ..." if parameter.nargs == -1 else ""
+    return text if parameter.required else f"[{text}]"
 
 
 def _value(parameter: Any) -> str:

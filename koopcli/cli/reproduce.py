@@ -29,7 +29,7 @@ SWEPT = {
 
 
 def reproduce(
-    method: Annotated[Method, typer.Argument(metavar="[edmd]", help="edmd: the paper's first method.")] = "edmd",
+    method: Annotated[Method, typer.Argument(metavar="edmd", help="edmd: the paper's first method.")] = "edmd",
     smoke: Annotated[bool, typer.Option("--smoke", help="A reduced grid, in seconds (experiment 'smoke').")] = False,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",

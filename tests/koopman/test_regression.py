@@ -39,8 +39,7 @@ def test_units_of_the_columns_do_not_matter(data):
 
 def test_ill_conditioned_columns_keep_their_digits(data):
     """Normal equations would lose all digits at a condition of 1e9; the blocked QR keeps half of them."""
-    V, Y = data
-    V = V.copy()
+    V = data[0].copy()
     V[:, 1] = V[:, 0] + 1e-9 * V[:, 1]
     truth = np.arange(60.0).reshape(12, 5)
     solution = least_squares(blocks(V, V @ truth, 40))

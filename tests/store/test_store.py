@@ -126,45 +126,45 @@ def test_a_newer_record_is_left_alone(store):
     assert path.exists()
 
 
-CALLS = ("open", "write", "fsync", "replace")
+def failing_on(real, n, code):
+    """``real``, failing on its n-th call."""
+    count = 0
+
+    def call(*args, **kwargs):
+        nonlocal count
+        count += 1
+        if count == n:
+            raise OSError(code, os.strerror(code))
+        return real(*args, **kwargs)
+
+    return call
 
 
-@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("call", ["open", "write", "fsync", "replace"])
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EIO, errno.EROFS])
 def test_an_error_at_any_write_leaves_the_old_state_or_the_new(store, monkeypatch, call, code):
-    """Fail the n-th call of each kind, for every n of a commit: no half state, and the next try succeeds."""
+    """Fail the n-th call of each kind, for every n of a commit: nothing committed is lost, nothing half is found."""
     old = commit(store, 1)
-    real, n = getattr(os, call), 0
-    for n in range(1, 30):
-        count = 0
-
-        def failing(*args, **kwargs):
-            nonlocal count
-            count += 1
-            if count == n:
-                raise OSError(code, os.strerror(code))
-            return real(*args, **kwargs)
-
-        monkeypatch.setattr(os, call, failing)
-        failed = False
-        try:
-            commit(store, 2, value=2.0)
-        except StorageError as error:
-            failed = True
-            assert "--store" in str(error)
-        monkeypatch.setattr(os, call, real)
+    refused = 0
+    for seed in range(2, 30):
+        with monkeypatch.context() as patch:
+            patch.setattr(os, call, failing_on(getattr(os, call), seed - 1, code))
+            try:
+                commit(store, seed, value=float(seed))
+            except StorageError:
+                refused += 1
         shelf = Store(store.root)
-        shelf.read(shelf.record("sample", old.key))
+        assert shelf.record("sample", old.key) == old
         for stage, key in shelf.index():
-            record = shelf.record(stage, key)
-            shelf.read(record)
+            shelf.read(shelf.record(stage, key))
+        assert not list((store.root / "tmp").iterdir())
+        if len(shelf.index()) > 1:
+            break
+        commit(store, seed, value=float(seed))
+        for stage, key in Store(store.root).index():
             if key != old.key:
                 (store.root / "records" / stage / f"{key}.json").unlink()
-        if not failed:
-            break
-    assert n > 1, "the call is never made"
-    assert not failed
-    commit(store, 2, value=2.0)
+    assert refused > 0
 
 
 def test_a_full_disk_says_what_was_needed(store, monkeypatch):

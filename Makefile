@@ -1,0 +1,64 @@
+# Every target sets up what it needs in $(VENV); nothing outside the checkout is touched.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+KOOP := $(BIN)/koop
+
+.DEFAULT_GOAL := help
+.PHONY: help reproduce reproduce-edmd smoke test check docs pins bench wheel clean
+
+help: ## Show this help
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
+
+reproduce: reproduce-edmd ## Reproduce the paper at full size and print paper versus here
+
+reproduce-edmd: $(VENV)/.installed ## Reproduce the EDMD experiment alone
+	$(KOOP) reproduce edmd
+
+smoke: $(VENV)/.installed ## Run the whole pipeline on a reduced grid, in a store of its own
+	@store=$$(mktemp -d) && trap 'rm -rf "$$store"' EXIT && \
+	$(KOOP) reproduce edmd --smoke --store "$$store" && \
+	$(KOOP) reproduce edmd --smoke --store "$$store" 2>/dev/null
+
+test: $(VENV)/.developing ## Run the tests
+	$(BIN)/python -m pytest
+
+check: $(VENV)/.developing ## Lint, types and the direction of imports
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+docs: $(VENV)/.developing ## Write docs/cli.md from the commands' own help
+	$(BIN)/python -m koopcli.cli.reference > docs/cli.md
+
+pins: $(VENV)/.developing ## Pin the stages' toy results, after raising a stage's version
+	$(BIN)/python -m tests.stages.toys
+
+bench: $(VENV)/.developing ## Measure speed and memory as ratios within one run (minutes)
+	$(BIN)/python benchmarks/run.py
+
+wheel: $(VENV)/.developing ## Build the wheel into dist/
+	rm -rf dist
+	$(BIN)/python -m build --wheel --outdir dist
+
+clean: ## Remove the environment and build leftovers, but no artefacts
+	rm -rf $(VENV) dist build .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find koopcli tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
+	  echo "koop needs Python 3.11 or newer as '$(PYTHON)': install it, or name another with make PYTHON=…" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+	  v=$$($(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
+	  echo "This Python has no ensurepip, which sets up environments: on Debian or Ubuntu, apt install python$$v-venv" >&2; \
+	  exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@touch $@
+
+$(VENV)/.developing: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $@ $(VENV)/.installed

@@ -1,0 +1,122 @@
+"""Real processes: killed, interrupted, terminated, racing, and on a terminal."""
+
+from __future__ import annotations
+
+import os
+import pty
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from koopcli.store import Store
+from tests.conftest import read_all
+
+KOOP = [sys.executable, "-m", "koopcli"]
+LONG = ["evaluate", "--experiment", "../tiny.toml", "--count", "4000", "--steps", "60", "--set", "evaluate.chunk=40"]
+KILLS = 8
+
+
+def start(folder: Path, *args: str, **options) -> subprocess.Popen:
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    return subprocess.Popen(
+        [*KOOP, *args],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **options,
+    )
+
+
+def wait_for_chunks(folder: Path, count: int, seconds: float = 30) -> int:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        found = len(list((folder / "artefacts" / "partial").glob("*/*.h5")))
+        if found >= count:
+            return found
+        time.sleep(0.005)
+    raise AssertionError("no chunk was committed")
+
+
+@pytest.mark.parametrize(("sent", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_interrupted_it_says_how_to_go_on_and_does(folder, sent, code):
+    process = start(folder, *LONG)
+    wait_for_chunks(folder, 3)
+    process.send_signal(sent)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == code
+    assert err.splitlines()[-1].endswith("run the same command again to resume")
+    assert "Traceback" not in err
+    assert out == ""
+    left = wait_for_chunks(folder, 1)
+    again = start(folder, *LONG)
+    out, err = again.communicate(timeout=60)
+    assert again.returncode == 0
+    assert f"{left} of 100 chunks were already there" in err
+    assert not list((folder / "artefacts" / "partial").iterdir())
+
+
+def test_killed_at_any_moment_it_loses_nothing_and_ends_the_same(folder, tmp_path):
+    rng = random.Random(12)
+    kept: set[tuple[str, str]] = set()
+    for _ in range(KILLS):
+        process = start(folder, *LONG)
+        time.sleep(rng.uniform(0.2, 1.5))
+        process.kill()
+        process.communicate()
+        if (folder / "artefacts").exists():
+            read_all(folder / "artefacts")
+            now = set(Store(folder / "artefacts").index())
+            assert kept <= now
+            kept = now
+    survivor = start(folder, *LONG)
+    name = survivor.communicate(timeout=60)[0].strip()
+    straight = start(folder, *LONG, "--store", str(tmp_path / "straight"))
+    assert straight.communicate(timeout=60)[0].strip() == name
+    objects = [Store(root).find(name).object for root in (folder / "artefacts", tmp_path / "straight")]
+    assert objects[0] == objects[1]
+
+
+def test_two_terminals_make_one_artefact_once(folder):
+    both = [start(folder, *LONG) for _ in range(2)]
+    done = [process.communicate(timeout=120) for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert done[0][0] == done[1][0]
+    made = [sum("evaluate/" in line and "made in" in line for line in err.splitlines()) for _, err in done]
+    assert sum(made) == 1
+    assert read_all(folder / "artefacts") == 6
+
+
+def test_bars_on_a_terminal_and_nothing_of_them_on_stdout(folder):
+    ours, theirs = pty.openpty()
+    command = [*KOOP, "reproduce", "--experiment", "../tiny.toml"]
+    environment = {**os.environ, "TERM": "xterm"}
+    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=theirs, env=environment) as process:
+        os.close(theirs)
+        shown = b""
+        while True:
+            try:
+                part = os.read(ours, 65536)
+            except OSError:  # the other end has closed
+                break
+            shown += part
+        out, _ = process.communicate(timeout=60)
+    os.close(ours)
+    assert process.returncode == 0
+    assert out.decode().startswith("artefacts/reports/edmd-")
+    assert out.count(b"\n") == 1
+    assert b"%" in shown
+    assert b"Paper versus here" in shown
+
+
+def test_a_closed_pipe_is_silent(folder):
+    with start(folder, "ls", "--json") as process:
+        process.stdout.close()
+        err = process.stderr.read()
+    assert "Traceback" not in err
