@@ -1,0 +1,91 @@
+"""``make bench``: every speed figure of the project in one run, as ratios where a ratio is meant.
+
+Tasks that are compared run in turn, A B A B …, each in its own process; medians of five. The machine is noisy and so
+nothing here is ever asserted in a test.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+HERE = Path(__file__).parent
+KOOP = [sys.executable, "-m", "koopcli"]
+RUNS = 5
+
+
+def command(*args: str, **options) -> dict[str, float]:
+    """Wall and CPU seconds and peak memory of a whole process."""
+    clock = time.perf_counter()
+    process = subprocess.Popen(args, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **options)
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    assert process.returncode == 0, args
+    return {
+        "wall": time.perf_counter() - clock,
+        "cpu": usage.ru_utime + usage.ru_stime,
+        "memory": usage.ru_maxrss / 1024,
+    }
+
+
+def task(name: str, store: Path) -> dict[str, float]:
+    done = subprocess.run([sys.executable, HERE / "tasks.py", name, store], capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
+
+
+def medians(runs: list[dict[str, float]]) -> dict[str, float]:
+    return {key: statistics.median(run[key] for run in runs) for key in runs[0]}
+
+
+def row(what: str, figure: str, aim: str) -> None:
+    print(f"| {what} | {figure} | {aim} |", flush=True)
+
+
+def main() -> None:
+    work = Path(tempfile.mkdtemp(prefix="koop-bench-"))
+    store = work / "store"
+    for where, kind in ((store, ["simulate"]), (store / "test", ["simulate", "--set", "sample.kind=box"])):
+        subprocess.run([*KOOP, *kind, "--store", str(where)], check=True, capture_output=True)
+
+    print("| what | measured | aim |\n|---|---|---|")
+    runs: dict[str, list[dict[str, float]]] = {name: [] for name in ("fit-product", "fit-plain", "fit-blocks")}
+    for _ in range(RUNS):
+        for name, found in runs.items():
+            found.append(task(name, store))
+    product, plain, blocks = (medians(runs[name]) for name in runs)
+    assert abs(product["result"] / plain["result"] - 1) < 1e-6, "the fits disagree"
+    row("order-7 fit, 202 500 samples: CPU s", f"{product['cpu']:.2f}", "")
+    row("the same by plain chunked normal equations: CPU s", f"{plain['cpu']:.2f}", "")
+    row("ratio", f"1 / {plain['cpu'] / product['cpu']:.1f}", "≤ 1/5")
+    row("the same data read in blocks, product unused: CPU s", f"{blocks['cpu']:.2f}", "")
+
+    fits = []
+    for _ in range(RUNS):
+        for path in (store / "records" / "fit-edmd").glob("*.json"):
+            path.unlink()
+        fits.append(command(*KOOP, "fit-edmd", "--store", str(store)))
+    row("`koop fit-edmd --order 7`, whole process: MB resident", f"{medians(fits)['memory']:.0f}", "≤ 300")
+    row("the same: wall s", f"{medians(fits)['wall']:.2f}", "")
+
+    scores = medians([task("evaluation", store) for _ in range(RUNS)])
+    row("evaluation 3 375 × 30, order 7: CPU s", f"{scores['cpu']:.2f}", "≤ 1")
+
+    helps = medians([command(*KOOP, "--help") for _ in range(RUNS)])
+    row("`koop --help`: wall s", f"{helps['wall']:.2f}", "≤ 0.25")
+
+    whole = [*KOOP, "reproduce", "edmd", "--store", str(work / "whole")]
+    cold = command(*whole)
+    row("`koop reproduce edmd`, cold: wall s", f"{cold['wall']:.0f}", "≤ 90")
+    row("the same: MB resident", f"{cold['memory']:.0f}", "")
+    warm = medians([command(*whole) for _ in range(RUNS)])
+    row("the same, warm: wall s", f"{warm['wall']:.2f}", "≤ 4")
+
+
+if __name__ == "__main__":
+    main()

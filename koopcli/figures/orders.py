@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from koopcli.figures.drawing import Drawing, column
-from koopcli.figures.style import COLOURS, COLUMN, PAPER, render, style
+from koopcli.figures.style import COLOURS, COLUMN, MARKERS, PAPER, render, style
 from koopcli.records import FloatArray
 
 PAPER_ORDERS, PAPER_RMSE = (6, 7), 11.1  # the caption of the paper's comparison of bases
@@ -52,13 +53,13 @@ def draw(curves: Sequence[OrderErrors]) -> Figure:
     with style():
         figure = Figure(figsize=(COLUMN, 2.6), layout="constrained")
         axes = figure.subplots()
-        for curve, colour in zip(curves, COLOURS * len(curves), strict=False):
+        for curve, colour, marker in zip(curves, cycle(COLOURS), cycle(MARKERS), strict=False):
             if len(curves) == 1:
                 axes.plot(curve.order, curve.maximum, ":^", color=COLOURS[1], label="maximum")
                 axes.plot(curve.order, curve.mean, "-o", color=COLOURS[0], label="mean")
                 axes.plot(curve.order, curve.median, "--s", color=COLOURS[2], label="median")
             else:
-                axes.plot(curve.order, curve.mean, "-o", color=colour, label=curve.label)
+                axes.plot(curve.order, curve.mean, marker=marker, color=colour, label=curve.label)
         points = [PAPER_RMSE] * len(PAPER_ORDERS)
         axes.plot(PAPER_ORDERS, points, "x", color=PAPER, markersize=6, label="paper's best (11.1 %)")
         axes.set_yscale("log")
@@ -66,5 +67,5 @@ def draw(curves: Sequence[OrderErrors]) -> Figure:
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_xlabel("order of the polynomial basis")
         axes.set_ylabel("RMSE (%)")
-        figure.legend(loc="outside lower center", ncols=2)
+        figure.legend(loc="outside lower center", ncols=2, title=curves[0].label if len(curves) == 1 else None)
     return figure

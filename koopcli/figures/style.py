@@ -12,12 +12,14 @@ COLUMN = 3.5  # inches, one column of a two-column page
 
 # Okabe and Ito's palette: distinct to every common form of colour vision
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+MARKERS = ("o", "s", "^", "D", "v", "P")
 PAPER = "#000000"
 
 STYLE = {
     "font.size": 8,
     "axes.labelsize": 8,
     "legend.fontsize": 7,
+    "legend.title_fontsize": 7,
     "xtick.labelsize": 7,
     "ytick.labelsize": 7,
     "axes.spines.top": False,

@@ -110,7 +110,7 @@ def _fit_product(trajectories: Trajectories, product: tuple[int, int], basis: Ba
     block = max(1, BLOCK // m)
     for start in range(0, states, block):
         stop = min(start + block, states)
-        x_next = trajectories.x[start * m : stop * m, 1].reshape(stop - start, m, -1)
+        x_next = trajectories.x[start * m : stop * m][:, 1].reshape(stop - start, m, -1)
         moments = basis.group_moments(x_next, weights)
         mean[start:stop] = moments[:, 0]
         slope += moments[:, 1:].sum(axis=0)
@@ -128,14 +128,14 @@ def _fit_product(trajectories: Trajectories, product: tuple[int, int], basis: Ba
 def _factors(trajectories: Trajectories, product: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
     """The input columns (m, n_u) and the states (n, n_x), after checking that the data are their product."""
     states, m = product
-    columns: FloatArray = trajectories.u[:m, 0]
+    columns: FloatArray = trajectories.u[:m][:, 0]
     x = np.empty((states, len(trajectories.state_channels)))
     block = max(1, BLOCK // m)
     for start in range(0, states, block):
         stop = min(start + block, states)
         rows = slice(start * m, stop * m)
-        x0 = trajectories.x[rows, 0].reshape(stop - start, m, -1)
-        u = trajectories.u[rows, 0].reshape(stop - start, m, -1)
+        x0 = trajectories.x[rows][:, 0].reshape(stop - start, m, -1)
+        u = trajectories.u[rows][:, 0].reshape(stop - start, m, -1)
         if (x0 != x0[:, :1]).any() or (u != columns).any():
             raise InvalidValueError(
                 f"the trajectories are marked as a product of {states} states × {m} inputs but are not: "

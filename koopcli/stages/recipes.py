@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.settings import BoxSample, GridSample, ImageFormat, Plot, Series
-from koopcli.errors import UnknownNameError
+from koopcli.errors import InvalidValueError, UnknownNameError
 from koopcli.stages.base import Task
 
 FITS = ("fit-edmd",)
@@ -56,8 +56,18 @@ def order_sweep(experiment: Experiment) -> list[Task]:
 
 
 def orders_figure(evaluations: Sequence[Task], image: ImageFormat) -> Task:
-    """The figure of errors against order, from evaluations of EDMD predictors."""
-    settings = Plot("orders", image, tuple(_series(task) for task in evaluations))
+    """The figure of errors against order, from evaluations of EDMD predictors.
+
+    Raises ``InvalidValueError`` when two of them would be one point of one curve.
+    """
+    series = tuple(_series(task) for task in evaluations)
+    for one in series:
+        if series.count(one) > 1:
+            raise InvalidValueError(
+                f"several evaluations of order {one.order} on draw {one.draw}, {one.excitation} inputs differ elsewhere: "
+                "name those of one experiment"
+            )
+    settings = Plot("orders", image, series)
     return Task("plot", settings, tuple((str(i), task) for i, task in enumerate(evaluations)))
 
 

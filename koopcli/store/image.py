@@ -5,7 +5,6 @@ HDF5 never writes to an object's final name: an interrupted write would leave a 
 
 from __future__ import annotations
 
-import io
 import json
 from pathlib import Path
 
@@ -40,8 +39,11 @@ def to_file(packed: Packed, path: Path) -> None:
 
 
 def from_bytes(image: bytes) -> Packed:
-    """The record of an image in memory."""
-    return _packed(h5py.File(io.BytesIO(image), "r"))
+    """The record of an image in memory, its arrays in memory too."""
+    with h5py.File.in_memory(image) as file:
+        lazy = _packed(file)
+        arrays = {path: Array(array.values[...], array.axes, array.units) for path, array in lazy.arrays.items()}
+        return Packed(arrays, lazy.meta)
 
 
 def from_file(path: Path) -> Packed:

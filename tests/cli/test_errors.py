@@ -102,6 +102,11 @@ def test_a_named_artefact_cannot_be_changed_after_the_fact(koop):
     one_line(koop("evaluate", "--on", "simulate", "--excitation", "held"), 2, "test.excitation cannot change it")
 
 
+def test_a_figure_does_not_mix_experiments(koop):
+    one, two = koop("evaluate").name, koop("evaluate", "--set", "vehicle.Jzz=1731").name
+    one_line(koop("plot", "orders", one, two), 3, "several evaluations of order 2", "name those of one experiment")
+
+
 def test_an_ambiguous_name_lists_the_candidates(koop):
     names = {koop("sample", "--seed", str(seed)).name for seed in (1, 2)}
     result = koop("simulate", "sample")
