@@ -64,7 +64,7 @@ def orders_figure(evaluations: Sequence[Task], image: ImageFormat) -> Task:
     for one in series:
         if series.count(one) > 1:
             raise InvalidValueError(
-                f"several evaluations of order {one.order} on draw {one.draw}, {one.excitation} inputs differ elsewhere: "
+                f"several evaluations of order {one.order}, draw {one.draw}, {one.excitation} inputs differ elsewhere: "
                 "name those of one experiment"
             )
     settings = Plot("orders", image, series)
