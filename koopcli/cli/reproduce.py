@@ -60,7 +60,7 @@ def reproduce(
         steps = {step.task: step for task in tasks for step in session.pipeline.plan(task)}
         show_plan(list(steps.values()), as_json=as_json)
         return
-    sweeps = [(label, reproduction.run_sweep(one, session.pipeline, label)) for label, one in runs]
+    sweeps = [(label, reproduction.run_sweep(one, session.pipeline, f"reproduce, {label}")) for label, one in runs]
     _finish(session, sweeps, as_json=as_json)
 
 
@@ -81,7 +81,7 @@ def _finish(session: Session, sweeps: list[tuple[str, Sweep]], *, as_json: bool)
     tables = [comparison.paper_table(sweeps), *comparison.order_tables(sweeps)]
     for table in tables:
         show_table(table.header, table.rows, title=table.title, file=sys.stderr)
-    for note in comparison.NOTES:
+    for note in comparison.notes(sweeps):
         session.console.note(note)
     records = [record for _, sweep in sweeps for record in sweep.records] + [figure.record]
     pin(session.pipeline.store, f"reproduce-edmd-{_identity(sweeps)}", records)
@@ -104,7 +104,7 @@ def _identity(sweeps: Sequence[tuple[str, Sweep]]) -> str:
 
 
 def _write_report(session: Session, sweeps: list[tuple[str, Sweep]], tables: list[Table], image: bytes) -> Path:
-    from koopcli.stages.comparison import NOTES
+    from koopcli.stages.comparison import notes
     from koopcli.store.files import publish, storage_errors
 
     root = session.pipeline.store.root
@@ -115,7 +115,7 @@ def _write_report(session: Session, sweeps: list[tuple[str, Sweep]], tables: lis
     lines += [
         "## What it means",
         "",
-        *(f"* {note}" for note in NOTES),
+        *(f"* {note}" for note in notes(sweeps)),
         "",
         f"![RMSE against order]({path.stem}.png)",
         "",

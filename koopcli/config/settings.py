@@ -118,11 +118,12 @@ class Series:
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure and what it draws of each input."""
+    """A figure, what it draws of each input, and the digest of the code that draws it."""
 
     figure: FigureName
     format: ImageFormat
     series: tuple[Series, ...]
+    drawn_by: str
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from koopcli.stages.reproduction import Sweep
 
 PAPER_RMSE = "11.1 %"
 PAPER_ORDERS = (6, 7)
+SAMPLES, TESTS = "202 500", "3 375 × 30"
 INPUTS = {"none": "no input", "fresh": "inputs fresh at each step", "held": "inputs held"}
 
 NOTES = (
@@ -26,6 +27,9 @@ NOTES = (
 )
 
 
+REDUCED = "This run is reduced or changed in size: its figures are not the paper's."
+
+
 @dataclass(frozen=True)
 class Table:
     """A table of texts."""
@@ -35,13 +39,19 @@ class Table:
     rows: list[list[str]]
 
 
+def notes(sweeps: Sequence[tuple[str, Sweep]]) -> list[str]:
+    """What the tables mean, beginning with a word on runs of another size than the paper's."""
+    sizes = {(_samples(sweep), _tests(sweep)) for _, sweep in sweeps}
+    return [*NOTES] if sizes == {(SAMPLES, TESTS)} else [REDUCED, *NOTES]
+
+
 def paper_table(sweeps: Sequence[tuple[str, Sweep]]) -> Table:
     """The paper's claims and figures beside each sweep's."""
     experiment = sweeps[0][1].experiment
     draw = experiment.reproduce.draws[0]
     rows = [
-        ["training samples", "4·15^4 = 202 500", *(_samples(s) for _, s in sweeps)],
-        ["test trajectories", "3 375 × 30", *(_tests(s) for _, s in sweeps)],
+        ["training samples", f"4·15^4 = {SAMPLES}", *(_samples(s) for _, s in sweeps)],
+        ["test trajectories", TESTS, *(_tests(s) for _, s in sweeps)],
     ]
     for excitation in experiment.reproduce.excitations:
         for order in PAPER_ORDERS:

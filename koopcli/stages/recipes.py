@@ -8,6 +8,7 @@ from dataclasses import replace
 from koopcli.config.experiment import Experiment
 from koopcli.config.settings import BoxSample, GridSample, ImageFormat, Plot, Series
 from koopcli.errors import InvalidValueError, UnknownNameError
+from koopcli.figures import source_digest
 from koopcli.stages.base import Task
 
 FITS = ("fit-edmd",)
@@ -67,7 +68,7 @@ def orders_figure(evaluations: Sequence[Task], image: ImageFormat) -> Task:
                 f"several evaluations of order {one.order}, draw {one.draw}, {one.excitation} inputs differ elsewhere: "
                 "name those of one experiment"
             )
-    settings = Plot("orders", image, series)
+    settings = Plot("orders", image, series, source_digest())
     return Task("plot", settings, tuple((str(i), task) for i, task in enumerate(evaluations)))
 
 

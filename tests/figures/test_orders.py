@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -44,6 +46,19 @@ def test_the_numbers_come_along():
     numbers = drawing([curve()], "svg").numbers
     assert numbers["random 0 fresh/mean"].values == pytest.approx(curve().mean)
     assert numbers["random 0 fresh/mean"].units == "%"
+
+
+def test_a_changed_drawing_has_another_key(monkeypatch, tmp_path):
+    """Pictures are not compared, so the code that draws them is part of their recipe."""
+    from koopcli import figures
+
+    before = figures.source_digest.__wrapped__()
+    for path in Path(figures.__file__).parent.glob("*.py"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    monkeypatch.setattr(figures, "__file__", str(tmp_path / "__init__.py"))
+    assert figures.source_digest.__wrapped__() == before
+    (tmp_path / "style.py").write_text("# another style")
+    assert figures.source_digest.__wrapped__() != before
 
 
 def test_nothing_global_is_left_behind():

@@ -76,7 +76,10 @@ TOYS = {
     ],
     "evaluate": [(Evaluate(chunk=100), {"predictor": _predictor(), "trajectories": _trajectories(4)})],
     "plot": [
-        (build(Plot, {"figure": "orders", "format": "png", "series": (Series(3, "a", "none"),)}), {"0": _evaluation()})
+        (
+            build(Plot, {"figure": "orders", "format": "png", "series": (Series(3, "a", "none"),), "drawn_by": ""}),
+            {"0": _evaluation()},
+        )
     ],
 }
 
