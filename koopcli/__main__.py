@@ -8,10 +8,7 @@ import sys
 from collections.abc import Sequence
 from types import FrameType
 
-import typer
-
-from koopcli.cli.app import app
-from koopcli.errors import InvalidValueError, KoopError
+from koopcli.errors import InvalidValueError, KoopError, StorageError
 
 RESUME = "interrupted: nothing committed is lost; run the same command again to resume"
 INTERRUPTED, TERMINATED = 130, 143
@@ -19,27 +16,61 @@ INTERRUPTED, TERMINATED = 130, 143
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    signal.signal(signal.SIGTERM, _terminate)
     try:
-        code = app(args=argv, prog_name="koop", standalone_mode=False)
+        signal.signal(signal.SIGTERM, _terminate)
+        _streams()
+        code = _run(argv)
+        sys.stdout.flush()
     except KoopError as error:
         return _fail(str(error), error.exit_code)
-    except typer.TyperException as error:
-        return _fail(error.format_message().replace("Value error, ", ""), getattr(error, "exit_code", 2))
     except MemoryError as error:
         return _fail(
             f"not enough memory ({error}): lower the count, the steps or the order", InvalidValueError.exit_code
         )
-    except (KeyboardInterrupt, typer.Abort):
+    except KeyboardInterrupt:
         code = INTERRUPTED
     except SystemExit as error:
-        code = error.code
+        code = TERMINATED if error.code == TERMINATED else 0  # typer's own exit: whoever read our output has left
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader has gone; stay silent at exit
-        return 1
+        _discard_stdout()
+        return 0
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        _discard_stdout()
+        return _fail(f"cannot write the output: {error.strerror}", StorageError.exit_code)
     if code in (INTERRUPTED, TERMINATED):
-        print(f"koop: {RESUME}", file=sys.stderr)
+        _fail(RESUME, code)
+    return code
+
+
+def _run(argv: Sequence[str] | None) -> int:
+    import typer  # noqa: PLC0415  (inside, so that Ctrl-C while it loads is answered too)
+
+    from koopcli.cli.app import app  # noqa: PLC0415
+
+    try:
+        code = app(args=argv, prog_name="koop", standalone_mode=False)
+    except typer.Abort:
+        return INTERRUPTED
+    except typer.TyperException as error:
+        return _fail(error.format_message().replace("Value error, ", ""), getattr(error, "exit_code", 2))
     return code if isinstance(code, int) else 0
+
+
+def _streams() -> None:
+    """Output that cannot fail for its encoding, nor for a stream that was closed before we began."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+
+
+def _discard_stdout() -> None:
+    """Let the interpreter's last flush go nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _fail(text: str, code: int) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import types
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
@@ -42,9 +43,13 @@ def setting(
     above: float | None = None,
     high: float | None = None,
     unit: str = "",
+    unique: bool = False,
 ) -> Any:
-    """A dataclass field with its documentation and bounds: ``low <= value``, ``above < value``, ``value <= high``."""
-    meta = {"help": help, "low": low, "above": above, "high": high, "unit": unit}
+    """A dataclass field with its documentation and bounds: ``low <= value``, ``above < value``, ``value <= high``.
+
+    ``unique``: a list without repetition.
+    """
+    meta = {"help": help, "low": low, "above": above, "high": high, "unit": unit, "unique": unique}
     return field(metadata=meta) if default is MISSING else field(default=default, metadata=meta)
 
 
@@ -77,7 +82,7 @@ def coerce(  # noqa: PLR0911  (one return for each kind of type reads best)
             return build(kind, value, origin, f"{name}.")
         if type(value) is kind:
             return value
-        raise InvalidValueError(origin.say(f"'{name}' must be a table of settings, got {value!r}"))
+        raise InvalidValueError(origin.say(f"'{name}' must be a table of settings, got {_short(repr(value))}"))
     if get_origin(kind) is Literal:
         return _choice(get_args(kind), value, name, origin)
     if get_origin(kind) in (Union, types.UnionType):
@@ -87,9 +92,14 @@ def coerce(  # noqa: PLR0911  (one return for each kind of type reads best)
         return coerce(inner, value, name, bounds, origin)
     if get_origin(kind) is tuple:
         if isinstance(value, str) or not isinstance(value, (list, tuple)) or not value:
-            raise InvalidValueError(origin.say(f"'{name}' must be a non-empty list such as [1, 2], got {value!r}"))
+            raise InvalidValueError(
+                origin.say(f"'{name}' must be a non-empty list such as [1, 2], got {_short(repr(value))}")
+            )
         inner = get_args(kind)[0]
-        return tuple(coerce(inner, v, f"{name}[{i}]", bounds, origin) for i, v in enumerate(value))
+        values = tuple(coerce(inner, v, f"{name}[{i}]", bounds, origin) for i, v in enumerate(value))
+        if bounds.get("unique") and len(set(values)) < len(values):
+            raise InvalidValueError(origin.say(f"'{name}' names a value twice: {_short(repr(value))}"))
+        return values
     number = _number(kind, value, name, origin)
     _within(number, name, bounds, origin)
     return number
@@ -104,35 +114,42 @@ def candidates(name: str, known: Any) -> str:
 
 
 def _choice(allowed: tuple[Any, ...], value: object, name: str, origin: Origin) -> object:
-    if value not in allowed:
-        raise origin.misnamed(origin.say(f"'{name}' cannot be {value!r}; choose one of {', '.join(map(str, allowed))}"))
+    if not isinstance(value, str) or value not in allowed:
+        raise origin.misnamed(
+            origin.say(f"'{name}' cannot be {_short(repr(value))}; choose one of {', '.join(map(str, allowed))}")
+        )
     return value
 
 
 def _number(kind: Any, value: object, name: str, origin: Origin) -> Any:
     wanted = {int: "a whole number", float: "a number", str: "a text", bool: "true or false"}[kind]
-    wrong = InvalidValueError(origin.say(f"'{name}' must be {wanted}, got {value!r}"))
+    wrong = InvalidValueError(origin.say(f"'{name}' must be {wanted}, got {_short(repr(value))}"))
     if isinstance(value, bool) != (kind is bool):
         raise wrong
     if kind is int and isinstance(value, float) and value.is_integer():
         return int(value)
     if kind is float and isinstance(value, int):
-        return float(value)
+        return float(value) if abs(value) < sys.float_info.max else math.inf
     if not isinstance(value, kind):
         raise wrong
     return value
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _within(value: Any, name: str, bounds: Mapping[str, Any], origin: Origin) -> None:
     if isinstance(value, str):
         return
     unit = f" {bounds['unit']}" if bounds.get("unit") else ""
+    shown = f"{value:.6g}" if isinstance(value, float) else _short(str(value))
     if isinstance(value, float) and not math.isfinite(value):
-        raise InvalidValueError(origin.say(f"'{name}' must be a finite number, got {value}"))
+        raise InvalidValueError(origin.say(f"'{name}' must be a finite number, got {shown}"))
     low, above, high = bounds.get("low"), bounds.get("above"), bounds.get("high")
     if low is not None and value < low:
-        raise InvalidValueError(origin.say(f"'{name}' must be at least {low}{unit}, got {value}"))
+        raise InvalidValueError(origin.say(f"'{name}' must be at least {low:g}{unit}, got {shown}"))
     if above is not None and value <= above:
-        raise InvalidValueError(origin.say(f"'{name}' must be above {above}{unit}, got {value}"))
+        raise InvalidValueError(origin.say(f"'{name}' must be above {above:g}{unit}, got {shown}"))
     if high is not None and value > high:
-        raise InvalidValueError(origin.say(f"'{name}' must be at most {high}{unit}, got {value}"))
+        raise InvalidValueError(origin.say(f"'{name}' must be at most {high:g}{unit}, got {shown}"))

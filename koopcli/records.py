@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -96,9 +97,14 @@ class Sample:
         return np.stack(np.meshgrid(*self.factors, indexing="ij"), axis=-1).reshape(-1, len(self.factors))
 
     @property
+    def starts(self) -> int:
+        """Number of initial states."""
+        return math.prod(len(factor) for factor in self.factors) if self.factors else len(self.states)
+
+    @property
     def product(self) -> tuple[int, int] | None:
         """(states, input rows) if every state meets every input row."""
-        return (len(self.x0), len(self.inputs)) if self.crossed else None
+        return (self.starts, len(self.inputs)) if self.crossed else None
 
     def expand(self, steps: int) -> tuple[FloatArray, FloatArray]:
         """Initial states (n, n_x) and inputs (n, steps, n_u) of each trajectory, state-major when crossed."""
@@ -179,12 +185,14 @@ class Trajectories:
         return self.x.shape[1] - 1
 
     def transitions(self, rows: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-        """One-step pairs (x, u, x⁺) in blocks of about ``rows``; no pair spans two trajectories."""
-        block = max(1, rows // max(1, self.steps))
+        """One-step pairs (x, u, x⁺) in blocks of at most ``rows``; no pair spans two trajectories."""
         n_x, n_u = self.x.shape[2], self.u.shape[2]
+        block = max(1, rows // self.steps)
         for start in range(0, len(self), block):
-            x, u = self.x[start : start + block], self.u[start : start + block]
-            yield x[:, :-1].reshape(-1, n_x), u.reshape(-1, n_u), x[:, 1:].reshape(-1, n_x)
+            chosen = slice(start, start + block)
+            for k in range(0, self.steps, rows):
+                x, u = self.x[chosen, k : k + rows + 1], self.u[chosen, k : k + rows]
+                yield x[:, :-1].reshape(-1, n_x), u.reshape(-1, n_u), x[:, 1:].reshape(-1, n_x)
 
     def pack(self) -> Packed:
         """The trajectories for storage."""

@@ -13,12 +13,13 @@ import typer
 
 from koopcli.cli.options import JsonOption, StoreOption, complete_name
 from koopcli.cli.session import open_store, print_json
-from koopcli.console import show_table
-from koopcli.errors import UnknownNameError
+from koopcli.console import Console, show_table
+from koopcli.errors import NewerFormatError, UnknownNameError
 
 if TYPE_CHECKING:
     from koopcli.stages.base import Task
     from koopcli.stages.pipeline import Artefact
+    from koopcli.store import Record, Store
 
 NameArgument = Annotated[
     str, typer.Argument(autocompletion=complete_name, help="An artefact, by name or any unambiguous beginning of it.")
@@ -41,9 +42,11 @@ def ls(
     if stage is not None and stage not in STAGES:
         raise UnknownNameError(f"unknown stage '{stage}' (known: {', '.join(STAGES)})")
     console, shelf = open_store(store)
-    found = [shelf.record(s, key) for s, key in shelf.index() if stage in (None, s)]
-    records = sorted((r for r in found if r is not None), key=lambda r: (r.provenance["time"], r.stage, r.key))
-    pinned = {name for names in pins(shelf).values() for name in names}
+    records = _records(shelf, stage, console)
+    labels: dict[str, list[str]] = {}
+    for label, names in pins(shelf).items():
+        for name in names:
+            labels.setdefault(name, []).append(label)
     rows = [
         {
             "name": record.name,
@@ -51,7 +54,7 @@ def ls(
             "seconds": record.provenance["seconds"],
             "bytes": record.size,
             "object": shelf.has_object(record),
-            "pinned": f"{record.stage}/{record.key}" in pinned,
+            "pins": labels.get(f"{record.stage}/{record.key}", []),
             "settings": record.recipe["settings"],
         }
         for record in records
@@ -64,14 +67,14 @@ def ls(
         [
             row["name"],
             row["made"].replace("T", " ")[:16],
-            "pinned" if row["pinned"] else "",
+            " ".join(row["pins"]),
             _brief(row["settings"]),
             f"{row['seconds']:.1f} s",
             size_text(row["bytes"]) if row["object"] else "missing",
         ]
         for row in rows
     ]
-    show_table(["artefact", "made (UTC)", "", "settings", "took", "size"], table, left=4)
+    show_table(["artefact", "made (UTC)", "pinned as", "settings", "took", "size"], table, left=4)
 
 
 def show(
@@ -145,9 +148,22 @@ def unpin(
     from koopcli.store import pins
 
     console, shelf = open_store(store)
-    label = name if name in pins.pins(shelf) else pins.label_of(shelf.find(name))
+    known = pins.pins(shelf)
+    label = name if name in known else pins.label_of(shelf.find(name))
     pins.unpin(shelf, label)
     console.note(f"unpinned {label}")
+
+
+def _records(shelf: Store, stage: str | None, console: Console) -> list[Record]:
+    """The records of the store, oldest first; those of a newer format are named and left out."""
+    found = []
+    for one, key in shelf.index():
+        if stage in (None, one):
+            try:
+                found.append(shelf.record(one, key))
+            except NewerFormatError as error:
+                console.warn(str(error))
+    return sorted((r for r in found if r is not None), key=lambda r: (r.provenance["time"], r.stage, r.key))
 
 
 def _obtain(name: str, store: Path | None) -> tuple[Artefact, Task, Path]:

@@ -179,6 +179,9 @@ def evaluate(
         of = session.named(predictor, recipes.FITS, "the PREDICTOR", TEST_SECTIONS)
     elsewhere = [section for section in session.changes if section != "test"]
     test = session.named(on, ["simulate"], "--on", elsewhere) if on else None
+    if of is not None and test is None and of.find("simulate") is None:
+        plant = recipes.remembered_plant(session.pipeline.make(of).content)
+        test = recipes.test_set(session.experiment, plant)
     session.run(recipes.evaluation(session.experiment, of, test), as_json=as_json, dry_run=dry_run)
 
 

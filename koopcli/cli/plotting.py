@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
 
@@ -47,6 +48,8 @@ def plot(
     if figure not in get_args(FigureName):
         raise UnknownNameError(f"unknown figure '{figure}'{candidates(figure, get_args(FigureName))}")
     image = _format(output)
+    if output is not None and not os.access(output.parent, os.W_OK):
+        raise StorageError(f"cannot write {output}: {output.parent} is not a folder one can write to")
     session = open_session(store, experiment, set_)
     from koopcli.stages import recipes
 
@@ -77,10 +80,14 @@ def _format(output: Path | None) -> ImageFormat:
 
 
 def _write(path: Path, content: bytes) -> None:
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        path.write_bytes(content)
+        beside.write_bytes(content)
+        os.replace(beside, path)
     except OSError as error:
         raise StorageError(f"cannot write {path}: {error.strerror}") from error
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def _list(*, as_json: bool) -> None:

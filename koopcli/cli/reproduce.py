@@ -40,7 +40,7 @@ def reproduce(
     """Reproduce the paper at full size: every order, training draw and kind of test inputs, beside its figures.
 
     What --set changes is shown beside the unmodified run. The tables, the figure and the names of all artefacts
-    are written to a file, whose path is printed; everything made is pinned.
+    are written to a file, whose path is printed. All of it is pinned, with what it was made from.
 
     Example: koop reproduce edmd --set vehicle.Jzz=1731
     """
@@ -54,7 +54,7 @@ def reproduce(
             raise UsageError(f"reproduce sweeps {name}: choose what it sweeps with --set '{SWEPT[name]}'")
     from koopcli.stages import reproduction
 
-    runs = _runs(session, base, set_ or [])
+    runs = _runs(session, base)
     if dry_run:
         tasks = [task for _, one in runs for _, task in reproduction.sweep_tasks(one)]
         steps = {step.task: step for task in tasks for step in session.pipeline.plan(task)}
@@ -64,10 +64,15 @@ def reproduce(
     _finish(session, sweeps, as_json=as_json)
 
 
-def _runs(session: Session, base: str, assignments: Sequence[str]) -> list[tuple[str, Experiment]]:
+def _runs(session: Session, base: str) -> list[tuple[str, Experiment]]:
     """The unmodified experiment, and the modified one beside it; a change of the sweep itself applies to both."""
-    plan = {"reproduce": session.changes["reproduce"]} if "reproduce" in session.changes else {}
-    changed = [text for text in assignments if not text.startswith("reproduce.")]
+    plan = {section: values for section, values in session.changes.items() if section == "reproduce"}
+    changed = [
+        f"{section}.{key}={value}"
+        for section, values in session.changes.items()
+        if section != "reproduce"
+        for key, value in values.items()
+    ]
     runs = [("here", load_experiment(base, plan))]
     return [*runs, (" ".join(changed), session.experiment)] if changed else runs
 
@@ -83,8 +88,10 @@ def _finish(session: Session, sweeps: list[tuple[str, Sweep]], *, as_json: bool)
         show_table(table.header, table.rows, title=table.title, file=sys.stderr)
     for note in comparison.notes(sweeps):
         session.console.note(note)
-    records = [record for _, sweep in sweeps for record in sweep.records] + [figure.record]
-    pin(session.pipeline.store, f"reproduce-edmd-{_identity(sweeps)}", records)
+    label = f"reproduce-edmd-{_identity(sweeps)}"
+    made = [scored.record for _, sweep in sweeps for scored in sweep.scored] + [figure.record]
+    pin(session.pipeline.store, label, session.pipeline.with_inputs(made))
+    session.console.note(f"pinned as {label}")
     path = _write_report(session, sweeps, [*tables, comparison.full_table(sweeps)], figure.content.image)
     if as_json:
         print_json(
@@ -99,7 +106,7 @@ def _finish(session: Session, sweeps: list[tuple[str, Sweep]], *, as_json: bool)
 
 
 def _identity(sweeps: Sequence[tuple[str, Sweep]]) -> str:
-    names = "\n".join(record.name for _, sweep in sweeps for record in sweep.records)
+    names = "\n".join(scored.record.name for _, sweep in sweeps for scored in sweep.scored)
     return hashlib.sha256(names.encode()).hexdigest()[:12]
 
 
@@ -133,10 +140,7 @@ def _markdown(table: Table) -> list[str]:
 
 
 def _run_json(label: str, sweep: Sweep) -> dict[str, Any]:
-    cells = [
-        {**vars(cell), "name": record.name, **figures}
-        for (cell, figures), record in zip(sweep.figures.items(), sweep.records, strict=True)
-    ]
+    cells = [{**vars(s.cell), "name": s.record.name, **s.figures} for s in sweep.scored]
     return {"run": label, "evaluations": cells}
 
 

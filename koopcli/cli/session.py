@@ -49,6 +49,7 @@ class Session:
         if dry_run:
             show_plan(self.pipeline.plan(task), as_json=as_json)
             return
+        self.console.note(f"store: {self.pipeline.store.root}")
         artefact = self.pipeline.make(task)
         if extra is not None:
             extra(artefact)

@@ -22,8 +22,12 @@ def locate(folder: str, name: str, what: str, relative_to: Path = Path()) -> Pat
     Raises ``UnknownNameError`` for a name that is not shipped, ``InvalidValueError`` for a path without a file.
     """
     if name.endswith(".toml") or "/" in name:
-        path = relative_to / Path(name).expanduser()
-        if not path.is_file():
+        try:
+            path = relative_to / Path(name).expanduser()
+            found = path.is_file()
+        except (OSError, RuntimeError, ValueError) as error:
+            raise InvalidValueError(f"{name}: cannot read the {what} file: {error}") from error
+        if not found:
             raise InvalidValueError(f"{name}: there is no such {what} file")
         return path
     shipped = {path.stem: path for path in sorted((data_folder() / folder).glob("*.toml"))}

@@ -44,6 +44,8 @@ def load_experiment(name: str, changes: Changes) -> Experiment:
         for section in values:
             if section not in SECTIONS:
                 raise origin.misnamed(origin.say(f"unknown section '{section}'{candidates(section, SECTIONS)}"))
+        if "vehicle" in values.get("simulate", {}):
+            raise origin.misnamed(origin.say("the vehicle has a section of its own: vehicle.name, vehicle.Jzz"))
     vehicle: Layer = ({"simulate": {"vehicle": _vehicle(layers)}}, COMMAND_LINE, Path())
     return Experiment(
         sample=_sample(layers),
@@ -65,18 +67,23 @@ def parse_set(assignments: Sequence[str]) -> Changes:
             raise UsageError(f"--set {text}: write --set stage.key=value, such as --set vehicle.Jzz=1731")
         if section not in SECTIONS:
             raise UsageError(f"--set {text}: unknown stage '{section}'{candidates(section, SECTIONS)}")
-        try:
-            value = tomllib.loads(f"value = {raw}")["value"]
-        except tomllib.TOMLDecodeError:
-            value = raw.strip()
-        changes.setdefault(section, {})[key] = value
+        changes.setdefault(section, {})[key] = _toml_value(raw)
     return changes
+
+
+def _toml_value(text: str) -> object:
+    """``text`` as one TOML value, or as it stands."""
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text.strip()
+    return parsed["value"] if len(parsed) == 1 else text.strip()
 
 
 def _read(path: Path, here: Origin) -> Changes:
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InvalidValueError(here.say(f"cannot read the experiment file: {error}")) from error
     for section, values in content.items():
         if not isinstance(values, dict):
@@ -99,10 +106,10 @@ def _sample(layers: Sequence[Layer]) -> GridSample | BoxSample:
     kind, relevant = "grid", list(layers)
     for i, (values, origin, _) in enumerate(layers):
         given = values.get("sample", {}).get("kind", kind)
-        if given not in SAMPLES:
+        if not isinstance(given, str) or given not in SAMPLES:
             raise origin.misnamed(origin.say(f"unknown kind of sample {given!r}{candidates(str(given), SAMPLES)}"))
         if given != kind:
-            kind, relevant = str(given), list(layers[i:])
+            kind, relevant = given, list(layers[i:])
     return _section(SAMPLES[kind], "sample", relevant)
 
 

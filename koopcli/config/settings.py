@@ -23,6 +23,7 @@ ImageFormat = Literal["png", "svg", "pdf"]
 
 BOX = (30.0, 30.0, 10.0)
 SEED_LIMIT = 2**63 - 1
+LARGEST = 1e12  # of any physical quantity: squares and sums of it stay far inside the floating-point range
 
 
 @dataclass(frozen=True)
@@ -33,8 +34,8 @@ class GridSample:
     seed: int = setting(0, low=0, high=SEED_LIMIT, help="seed of every draw")
     count: int = setting(15, low=1, high=10_000, help="values per state")
     draw: Draw = setting("random", help="how the values of a state are chosen")
-    box: tuple[float, ...] = setting(BOX, above=0, help="half-width per state: m/s, m/s, rad/s")
-    levels: tuple[float, ...] = setting((1.0, 5.0, 10.0, 100.0), low=0, unit="N", help="input ranges F_m")
+    box: tuple[float, ...] = setting(BOX, low=1e-6, high=LARGEST, help="half-width per state: m/s, m/s, rad/s")
+    levels: tuple[float, ...] = setting((1.0, 5.0, 10.0, 100.0), low=0, high=LARGEST, unit="N", help="input ranges F_m")
     columns: int = setting(15, low=1, high=100_000, help="input columns per range")
 
     @property
@@ -56,9 +57,9 @@ class BoxSample:
     seed: int = setting(7, low=0, high=SEED_LIMIT, help="seed of every draw")
     count: int = setting(3375, low=1, high=100_000_000, help="number of states")
     excitation: Excitation = setting("fresh", help="inputs: none, fresh at each step, or held")
-    amplitude: float = setting(1e4, low=0, unit="N", help="inputs are uniform in ± amplitude")
+    amplitude: float = setting(1e4, low=0, high=LARGEST, unit="N", help="inputs are uniform in ± amplitude")
     steps: int = setting(30, low=1, high=1_000_000, help="steps of each trajectory")
-    box: tuple[float, ...] = setting(BOX, above=0, help="half-width per state: m/s, m/s, rad/s")
+    box: tuple[float, ...] = setting(BOX, low=1e-6, high=LARGEST, help="half-width per state: m/s, m/s, rad/s")
 
     @property
     def trajectories(self) -> int:
@@ -71,10 +72,8 @@ class BoxSample:
         return self.steps
 
     def settled(self) -> BoxSample:
-        """The same sample with what does not matter for its excitation at a fixed value: one sample, one key."""
-        amplitude = 0.0 if self.excitation == "none" else self.amplitude
-        steps = self.steps if self.excitation == "fresh" else BoxSample.steps
-        return replace(self, amplitude=amplitude, steps=steps)
+        """The same sample with the amplitude that does not matter at zero: one sample, one key."""
+        return replace(self, amplitude=0.0) if self.excitation == "none" else self
 
 
 SAMPLES: dict[str, type[GridSample] | type[BoxSample]] = {"grid": GridSample, "box": BoxSample}
@@ -95,7 +94,7 @@ class Simulate:
 class FitEdmd:
     """EDMD with inputs."""
 
-    order: int = setting(7, low=1, help="highest degree of each state")
+    order: int = setting(7, low=1, high=1000, help="highest degree of each state")
     basis: BasisName = setting("tensor", help="family of observables")
 
 
@@ -103,8 +102,8 @@ class FitEdmd:
 class Evaluate:
     """Scores on test trajectories, committed part by part."""
 
-    first: int = setting(1, low=0, help="first scored sample")
-    chunk: int = setting(2048, low=1, help="trajectories for each committed part")
+    first: int = setting(1, low=0, high=1_000_000, help="first scored sample")
+    chunk: int = setting(2048, low=1, high=100_000_000, help="trajectories for each committed part")
 
 
 @dataclass(frozen=True)
@@ -130,6 +129,6 @@ class Plot:
 class Reproduce:
     """What `koop reproduce edmd` sweeps over."""
 
-    orders: tuple[int, ...] = setting(tuple(range(1, 11)), low=1, help="basis orders")
-    draws: tuple[Draw, ...] = setting(("random", "even"), help="kinds of training grid")
-    excitations: tuple[Excitation, ...] = setting(("none", "fresh", "held"), help="test inputs")
+    orders: tuple[int, ...] = setting(tuple(range(1, 11)), low=1, high=1000, unique=True, help="basis orders")
+    draws: tuple[Draw, ...] = setting(("random", "even"), unique=True, help="kinds of training grid")
+    excitations: tuple[Excitation, ...] = setting(("none", "fresh", "held"), unique=True, help="test inputs")

@@ -12,11 +12,11 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
 from koopcli.figures.drawing import Drawing, column
 from koopcli.figures.style import COLOURS, COLUMN, MARKERS, PAPER, render, style
 from koopcli.records import FloatArray
 
-PAPER_ORDERS, PAPER_RMSE = (6, 7), 11.1  # the caption of the paper's comparison of bases
 INPUTS = {"none": "no input", "fresh": "fresh inputs", "held": "held inputs"}
 
 
@@ -60,8 +60,9 @@ def draw(curves: Sequence[OrderErrors]) -> Figure:
                 axes.plot(curve.order, curve.median, "--s", color=COLOURS[2], label="median")
             else:
                 axes.plot(curve.order, curve.mean, marker=marker, color=colour, label=curve.label)
-        points = [PAPER_RMSE] * len(PAPER_ORDERS)
-        axes.plot(PAPER_ORDERS, points, "x", color=PAPER, markersize=6, label="paper's best (11.1 %)")
+        points = [BEST_RMSE] * len(BEST_ORDERS)
+        label = f"paper's best ({BEST_RMSE} %)"
+        axes.plot(BEST_ORDERS, points, "x", color=PAPER, markersize=6, label=label)
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -20,8 +20,8 @@ class Basis(Protocol):
         """Number of observables N."""
 
     @property
-    def constant(self) -> int:
-        """Index of the observable that is one everywhere."""
+    def constant(self) -> int | None:
+        """Index of the observable that is one everywhere, if there is one."""
 
     @property
     def state_map(self) -> FloatArray:
@@ -46,7 +46,11 @@ class TensorPolynomial:
     """
 
     axes: tuple[OrthonormalPolynomials, ...]
-    constant = 0
+
+    @property
+    def constant(self) -> int:
+        """The product of the constants comes first."""
+        return 0
 
     @property
     def functions(self) -> int:
@@ -91,7 +95,7 @@ class TensorPolynomial:
         """The recurrence coefficients of each factor."""
         arrays: dict[str, Array] = {}
         for i, axis in enumerate(self.axes):
-            arrays[f"{i}/map"] = Array(np.array([axis.centre, axis.scale]), ("centre and scale",), "state")
+            arrays[f"{i}/map"] = Array(np.array([axis.centre, axis.scale]), ("centre and scale",), "that of the state")
             arrays[f"{i}/alpha"] = Array(axis.alpha, ("degree",), "1")
             arrays[f"{i}/beta"] = Array(axis.beta, ("degree",), "1")
         return Packed(arrays, {"basis": "tensor", "axes": len(self.axes)})

@@ -16,6 +16,7 @@ from koopcli.records import FloatArray, Trajectories
 
 BLOCK = 4096  # rows lifted together
 MARGINAL_ROWS = 1 << 18  # rows that may shape the basis; the regression always reads all of them
+GOLDEN = (5**0.5 - 1) / 2
 
 
 class _Operators(NamedTuple):
@@ -28,15 +29,32 @@ class _Operators(NamedTuple):
 def basis_from_data(trajectories: Trajectories, kind: str, order: int) -> Basis:
     """The basis ``kind`` of ``order`` on the distinct values that each state takes in the data, with their shares.
 
-    Of more than ``MARGINAL_ROWS`` samples only every k-th shapes the basis; the fit is over all of them.
+    A product dataset shows them in its states; of more than ``MARGINAL_ROWS`` other samples a spread choice shapes
+    the basis, while the fit is over all of them.
     """
-    every = -(-len(trajectories) * trajectories.steps // MARGINAL_ROWS)
-    x = np.concatenate([x[::every] for x, _, _ in trajectories.transitions(BLOCK)])
+    if trajectories.product is not None and trajectories.steps == 1:
+        x = _factors(trajectories, trajectories.product)[1]
+    else:
+        x = _spread_rows(trajectories)
     nodes = []
     for column in x.T:
         values, counts = np.unique(column, return_counts=True)
         nodes.append((values, counts / counts.sum()))
     return BASES[kind].make(nodes, order)
+
+
+def _spread_rows(trajectories: Trajectories) -> FloatArray:
+    """At most ``MARGINAL_ROWS`` states, spread by multiples of the golden ratio, which no regular data can match."""
+    total = len(trajectories) * trajectories.steps
+    chosen = np.arange(total)
+    if total > MARGINAL_ROWS:
+        chosen = np.unique((np.arange(MARGINAL_ROWS) * GOLDEN % 1.0 * total).astype(np.int64))
+    found, start = [], 0
+    for x, _, _ in trajectories.transitions(BLOCK):
+        first, last = np.searchsorted(chosen, [start, start + len(x)])
+        found.append(x[chosen[first:last] - start])
+        start += len(x)
+    return np.concatenate(found)
 
 
 def fit(trajectories: Trajectories, basis: Basis, progress: Progress = silent) -> Predictor:
@@ -55,7 +73,7 @@ def fit(trajectories: Trajectories, basis: Basis, progress: Progress = silent) -
             f"{samples} samples cannot determine {basis.functions} functions and "
             f"{len(trajectories.input_channels)} inputs: lower the order or sample more"
         )
-    if trajectories.product is not None and trajectories.steps == 1:
+    if trajectories.product is not None and trajectories.steps == 1 and basis.constant is not None:
         A, B, rank, condition = _fit_product(trajectories, trajectories.product, basis, progress)
     else:
         A, B, rank, condition = _fit_blocks(trajectories, basis, progress)
@@ -76,53 +94,70 @@ def fit(trajectories: Trajectories, basis: Basis, progress: Progress = silent) -
 
 
 def _fit_blocks(trajectories: Trajectories, basis: Basis, progress: Progress) -> _Operators:
-    """Least squares on the rows [ψ(x), u], read in blocks."""
+    """Least squares on the rows [ψ(x), u], read in blocks; u is centred where the basis has a constant."""
     N, total = basis.functions, len(trajectories) * trajectories.steps
+    u_mean = np.zeros(len(trajectories.input_channels))
+    if basis.constant is not None:
+        u_mean = sum((u.sum(axis=0) for _, u, _ in trajectories.transitions(BLOCK)), u_mean) / total
 
     def rows() -> Iterator[tuple[FloatArray, FloatArray]]:
         done = 0
         for x, u, x_next in trajectories.transitions(BLOCK):
-            yield np.hstack([basis.lift(x), u]), basis.lift(x_next)
+            yield np.hstack([basis.lift(x), _centred(u, u_mean)]), basis.lift(x_next)
             done += len(x)
             progress(done, total)
 
     solution = least_squares(rows)
-    W = solution.coefficients
-    return _Operators(W[:N].T.copy(), W[N:].T.copy(), solution.rank, solution.condition)
+    A, B = solution.coefficients[:N].T.copy(), solution.coefficients[N:].T.copy()
+    return _Operators(_fold(A, B, u_mean, basis), B, solution.rank, solution.condition)
 
 
 def _fit_product(trajectories: Trajectories, product: tuple[int, int], basis: Basis, progress: Progress) -> _Operators:
     """The same minimum from the mean and the slope of ψ(x⁺) over the inputs of each state (4.5).
 
-    The centred inputs are orthogonal to every ψ(x), so A and B separate; B's share of the mean input goes to the
-    constant's column of A.
+    The centred inputs are orthogonal to every ψ(x), so A and B separate.
     """
     states, m = product
     columns, x = _factors(trajectories, product)
     u_mean = columns.mean(axis=0)
-    centred = columns - u_mean
-    spread = np.linalg.norm(centred, axis=0)
-    scaled = centred / np.where(spread > 0, spread, 1.0)
-    weights = np.column_stack([np.full(m, 1 / m), np.linalg.pinv(scaled).T / np.where(spread > 0, spread, 1.0)])
-
-    mean = np.empty((states, basis.functions))
+    centred = _centred(columns, u_mean)
+    length = np.linalg.norm(centred, axis=0)
+    length[length == 0] = 1.0
+    left, singular, right = np.linalg.svd(centred / length, full_matrices=False)
+    keep = singular > singular[0] * np.finfo(float).eps * m
+    slopes = (left[:, keep] / singular[keep]) @ right[keep] / length  # Σ_j slopes_j u_jᵀ is the identity
+    weights = np.column_stack([np.full(m, 1 / m), slopes])
     slope = np.zeros((columns.shape[1], basis.functions))
-    block = max(1, BLOCK // m)
-    for start in range(0, states, block):
-        stop = min(start + block, states)
-        x_next = trajectories.x[start * m : stop * m][:, 1].reshape(stop - start, m, -1)
-        moments = basis.group_moments(x_next, weights)
-        mean[start:stop] = moments[:, 0]
-        slope += moments[:, 1:].sum(axis=0)
-        progress(stop, states)
 
-    solution = least_squares(lambda: [(basis.lift(x), mean)])
-    B = slope.T / states
-    A = solution.coefficients.T.copy()
-    A[:, basis.constant] -= B @ u_mean
-    singular = np.linalg.svd(scaled, compute_uv=False)
-    rank = solution.rank + int(np.linalg.matrix_rank(scaled))
-    return _Operators(A, B, rank, condition_number(np.concatenate([solution.singular_values, singular])))
+    def rows() -> Iterator[tuple[FloatArray, FloatArray]]:
+        slope[:] = 0
+        block = max(1, BLOCK // m)
+        for start in range(0, states, block):
+            stop = min(start + block, states)
+            x_next = trajectories.x[start * m : stop * m][:, 1].reshape(stop - start, m, -1)
+            moments = basis.group_moments(x_next, weights)
+            slope[:] += moments[:, 1:].sum(axis=0)
+            yield basis.lift(x[start:stop]), moments[:, 0]
+            progress(stop, states)
+
+    solution = least_squares(rows)
+    A, B = solution.coefficients.T.copy(), slope.T / states
+    condition = condition_number(np.concatenate([solution.singular_values, singular]))
+    return _Operators(_fold(A, B, u_mean, basis), B, solution.rank + int(keep.sum()), condition)
+
+
+def _centred(u: FloatArray, u_mean: FloatArray) -> FloatArray:
+    """``u - u_mean`` with what is only rounding set to zero: an input that never moves determines nothing."""
+    centred = u - u_mean
+    centred[np.abs(centred) <= 64 * np.finfo(float).eps * np.abs(u_mean)] = 0.0
+    return centred
+
+
+def _fold(A: FloatArray, B: FloatArray, u_mean: FloatArray, basis: Basis) -> FloatArray:
+    """A with B's share of the mean input in the column of the constant (4.5)."""
+    if basis.constant is not None:
+        A[:, basis.constant] -= B @ u_mean
+    return A
 
 
 def _factors(trajectories: Trajectories, product: tuple[int, int]) -> tuple[FloatArray, FloatArray]:

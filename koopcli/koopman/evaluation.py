@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from koopcli.records import Array, BoolArray, Channels, FloatArray, Meta, Packed
 class Evaluation:
     """Scores of n trajectories: ``rmse``, ``rmse_printed``, ``rmse_relift`` (n,) in percent; ``max_error`` (n, n_x)
     the largest error of each state; ``in_domain`` (n,) the share of true samples inside the training box;
-    ``diverged`` (n,); ``x0`` (n, n_x). A diverged trajectory keeps its row, and stays out of the figures.
+    ``diverged`` and ``diverged_relift`` (n,) of the two kinds of prediction; ``x0`` (n, n_x). A diverged prediction
+    keeps its row and stays out of the figures of its kind.
     """
 
     x0: FloatArray
@@ -27,6 +28,7 @@ class Evaluation:
     max_error: FloatArray
     in_domain: FloatArray
     diverged: BoolArray
+    diverged_relift: BoolArray
     steps: int
     first: int
     functions: int
@@ -40,11 +42,12 @@ class Evaluation:
         return {
             "rmse": metrics.summary(self.rmse[valid]),
             "rmse_printed": metrics.summary(self.rmse_printed[valid]),
-            "rmse_relift": metrics.summary(self.rmse_relift[valid]),
+            "rmse_relift": metrics.summary(self.rmse_relift[~self.diverged_relift]),
             "max_error": dict(zip(self.state_channels.names, worst, strict=True)),
             "trajectories": len(self.rmse),
             "steps": self.steps,
             "diverged": int(self.diverged.sum()),
+            "diverged_relift": int(self.diverged_relift.sum()),
             "undefined": int(np.isnan(self.rmse[valid]).sum()),
             "in_domain_share": float(self.in_domain.mean()),
             "functions": self.functions,
@@ -56,9 +59,9 @@ class Evaluation:
         header = [f"{name}_0 ({unit})" for name, unit in states]
         header += ["rmse (%)", "rmse_printed (%)", "rmse_relift (%)"]
         header += [f"max_error {name} ({unit})" for name, unit in states]
-        header += ["in_domain (1)", "diverged (1)"]
+        header += ["in_domain (1)", "diverged (1)", "diverged_relift (1)"]
         columns = [self.x0, self.rmse, self.rmse_printed, self.rmse_relift, self.max_error, self.in_domain]
-        return header, np.column_stack([*columns, self.diverged]).tolist()
+        return header, np.column_stack([*columns, self.diverged, self.diverged_relift]).tolist()
 
     def pack(self) -> Packed:
         """The evaluation for storage."""
@@ -72,6 +75,7 @@ class Evaluation:
             "max_error": Array(self.max_error, per_state, units),
             "in_domain": Array(self.in_domain, row, "1"),
             "diverged": Array(self.diverged, row, "1"),
+            "diverged_relift": Array(self.diverged_relift, row, "1"),
         }
         meta = {
             "steps": self.steps,
@@ -112,6 +116,7 @@ def evaluate(predictor: Predictor, trajectories: Trajectories, rows: slice, firs
             max_error=np.abs(once[:, scored] - x[:, scored]).max(axis=1),
             in_domain=metrics.in_domain(x[:, scored], predictor.domain),
             diverged=metrics.diverged(once[:, scored], predictor.domain),
+            diverged_relift=metrics.diverged(relift[:, scored], predictor.domain),
             steps=trajectories.steps,
             first=first,
             functions=predictor.functions,
@@ -121,14 +126,12 @@ def evaluate(predictor: Predictor, trajectories: Trajectories, rows: slice, firs
 
 def join(parts: Sequence[Evaluation]) -> Evaluation:
     """One evaluation from those of consecutive rows."""
-    one = parts[0]
-    return Evaluation(
-        **{name: np.concatenate([getattr(p, name) for p in parts]) for name in one.pack().arrays},
-        steps=one.steps,
-        first=one.first,
-        functions=one.functions,
-        state_channels=one.state_channels,
-    )
+    rows = {
+        field.name: np.concatenate([getattr(part, field.name) for part in parts])
+        for field in fields(Evaluation)
+        if isinstance(getattr(parts[0], field.name), np.ndarray)
+    }
+    return replace(parts[0], **rows)
 
 
 def _check(predictor: Predictor, trajectories: Trajectories, first: int) -> None:

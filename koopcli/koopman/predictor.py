@@ -10,6 +10,8 @@ from koopcli.errors import InvalidValueError
 from koopcli.koopman.bases import BASES, Basis
 from koopcli.records import Array, Channels, FloatArray, Meta, Packed
 
+SEGMENT = 128  # steps whose responses are formed together
+
 
 @dataclass(frozen=True)
 class Predictor:
@@ -82,7 +84,7 @@ class Predictor:
         meta = {
             "dt": self.dt,
             "rank": self.rank,
-            "condition": self.condition,
+            "condition": self.condition if np.isfinite(self.condition) else None,
             "spectral_radius": self.spectral_radius,
             "plant": self.plant,
             "basis": basis.meta,
@@ -106,7 +108,7 @@ class Predictor:
             state_channels=Channels.unpack(meta["state_channels"]),
             input_channels=Channels.unpack(meta["input_channels"]),
             rank=meta["rank"],
-            condition=meta["condition"],
+            condition=np.inf if meta["condition"] is None else meta["condition"],
             spectral_radius=meta["spectral_radius"],
             plant=meta["plant"],
         )
@@ -115,18 +117,33 @@ class Predictor:
 def response(predictor: Predictor, z0: FloatArray, u: FloatArray) -> FloatArray:
     """x̂_k = C A^k z_0 + Σ_i C A^(k-1-i) B u_i (4.3) as (n, steps+1, n_x), for ``z0`` (n, N), ``u`` (n, steps, n_u).
 
-    Only the n_x rows of C A^k are ever formed; the lifted state is not rolled.
+    Only the n_x rows of C A^k are ever formed; the lifted state is not rolled. Time goes in segments, so that memory
+    grows with the steps and not with their square.
     """
     n, steps, n_u = u.shape
-    n_x = len(predictor.C)
-    observed = np.empty((steps + 1, n_x, predictor.functions))  # C A^k
-    observed[0] = predictor.C
-    for k in range(steps):
-        observed[k + 1] = observed[k] @ predictor.A
-    x = (z0 @ observed.reshape(-1, predictor.functions).T).reshape(n, steps + 1, n_x)
-    markov = observed[:steps] @ predictor.B  # C A^k B
-    forced = np.zeros((steps, n_u, steps, n_x))  # block Toeplitz: input i to sample k + 1
-    for i in range(steps):
-        forced[i, :, i:] = markov[: steps - i].transpose(2, 0, 1)
-    x[:, 1:] += (u.reshape(n, -1) @ forced.reshape(steps * n_u, -1)).reshape(n, steps, n_x)
+    n_x, N = predictor.C.shape
+    x = np.empty((n, steps + 1, n_x))
+    markov = np.empty((steps, n_x, n_u))  # C A^k B
+    rows = predictor.C  # C A^k
+    for start in range(0, steps + 1, SEGMENT):
+        stop = min(start + SEGMENT, steps + 1)
+        observed = np.empty((stop - start, n_x, N))
+        for k in range(stop - start):
+            observed[k] = rows
+            rows = rows @ predictor.A
+        x[:, start:stop] = (z0 @ observed.reshape(-1, N).T).reshape(n, -1, n_x)
+        markov[start : min(stop, steps)] = observed[: steps - start] @ predictor.B
+    for first in range(0, steps, SEGMENT):  # the inputs of one segment ...
+        inputs = u[:, first : first + SEGMENT]
+        for later in range(first, steps, SEGMENT):  # ... act on its own samples and on those of every later one
+            samples = min(SEGMENT, steps - later)
+            acting = _toeplitz(markov, later - first, inputs.shape[1], samples)
+            x[:, later + 1 : later + 1 + samples] += (inputs.reshape(n, -1) @ acting).reshape(n, samples, n_x)
     return x
+
+
+def _toeplitz(markov: FloatArray, delay: int, inputs: int, samples: int) -> FloatArray:
+    """What input i of a segment adds to sample j + 1 of one ``delay`` steps later, (inputs · n_u, samples · n_x)."""
+    lag = delay + np.arange(samples) - np.arange(inputs)[:, np.newaxis]
+    block = np.where((lag >= 0)[..., np.newaxis, np.newaxis], markov[np.maximum(lag, 0)], 0.0)
+    return block.transpose(0, 3, 1, 2).reshape(inputs * markov.shape[2], samples * markov.shape[1])

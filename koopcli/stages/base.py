@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from koopcli.errors import UnknownNameError
+from koopcli.errors import InvalidValueError, UnknownNameError
 from koopcli.progress import Progress
 from koopcli.records import Meta, Packed
+from koopcli.store.files import size_text
 
 Inputs = Mapping[str, Any]  # role -> record
+MEMORY_SHARE = 0.4  # arrays are held about twice while they are made and stored
+
+
+def refuse_beyond_memory(what: str, needed: float, remedy: str) -> None:
+    """Raise ``InvalidValueError`` for arrays of ``needed`` bytes that this machine's memory cannot hold."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if needed > MEMORY_SHARE * memory:
+        raise InvalidValueError(
+            f"{what} would need {size_text(needed)} of this machine's {size_text(memory)}: lower {remedy}"
+        )
 
 
 class Reporter(Protocol):
@@ -63,6 +75,15 @@ class Task:
     def find(self, stage: str) -> Task | None:
         """The nearest task of ``stage`` upstream, this one included, if it is known."""
         return next((task for task in self.upstream() if task.stage == stage), None)
+
+    def input(self, role: str) -> Task:
+        """The input ``role``. Raises ``UnknownNameError`` when its record is gone."""
+        found = dict(self.inputs).get(role)
+        if found is None:
+            raise UnknownNameError(
+                f"the {role} behind {self.stage}/{(self.key or '')[:12]} is no longer in the store: make it afresh"
+            )
+        return found
 
     def ancestor(self, stage: str) -> Task:
         """The same, where nothing can be done without it. Raises ``UnknownNameError`` when its record is gone."""

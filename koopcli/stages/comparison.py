@@ -5,29 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from koopcli.config.settings import GridSample
+from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
+from koopcli.config.settings import BoxSample, GridSample
+from koopcli.records import Meta
 from koopcli.stages.reproduction import Sweep
 
-PAPER_RMSE = "11.1 %"
-PAPER_ORDERS = (6, 7)
-SAMPLES, TESTS = "202 500", "3 375 × 30"
 INPUTS = {"none": "no input", "fresh": "inputs fresh at each step", "held": "inputs held"}
 
 NOTES = (
-    "The paper does not state the test inputs behind its 11.1 %, so three kinds are scored: none, ±1e4 N redrawn at "
-    "each step (fresh), and ±1e4 N held over the trajectory.",
-    "The fall up to order 6 is the truncation of exp(-i r t) in the yaw rate r. The floor with inputs is not the "
-    "basis: a constant B cannot hold the products of an input with powers of r, and no linear-in-input predictor "
-    "with the exact free response would score better. So 11.1 % is a statement about unstated inputs.",
+    "The paper does not state the test inputs behind its {paper} %, so three kinds are scored: none, ±{amplitude:g} N "
+    "redrawn at each step (fresh), and ±{amplitude:g} N held over the trajectory.",
+    "The fall with the order is the truncation of exp(-i r t) in the yaw rate r. The floor with inputs is not the "
+    "basis: a constant B cannot hold the products of an input with powers of r, and even the exact free response with "
+    "the best constant input response scores the same. So {paper} % is a statement about unstated inputs.",
     "The growth at high orders that the paper reports is that of a regression on raw monomials. In an orthonormal "
-    "basis a smaller growth is left, on random draws only: extrapolation beyond the drawn values in a few corners, "
-    "which moves the mean and not the median.",
-    "The paper states no yaw inertia either, and with held inputs the score follows it: --set vehicle.Jzz=1731 "
-    "shows how far. No parameter was chosen to print the paper's figure.",
+    "basis a smaller growth is left where training values are drawn at random: extrapolation beyond them in a few "
+    "corners, which moves the mean and not the median.",
+    "The paper states no yaw inertia either, and with held inputs the score follows it: --set vehicle.Jzz=1731 shows "
+    "how far. No parameter was chosen to print the paper's figure.",
 )
-
-
-REDUCED = "This run is reduced or changed in size: its figures are not the paper's."
+REDUCED = "This run is not of the paper's size: its figures cannot be put beside the paper's."
 
 
 @dataclass(frozen=True)
@@ -41,8 +38,11 @@ class Table:
 
 def notes(sweeps: Sequence[tuple[str, Sweep]]) -> list[str]:
     """What the tables mean, beginning with a word on runs of another size than the paper's."""
-    sizes = {(_samples(sweep), _tests(sweep)) for _, sweep in sweeps}
-    return [*NOTES] if sizes == {(SAMPLES, TESTS)} else [REDUCED, *NOTES]
+    full = (_samples(GridSample()), _tests(BoxSample()))
+    sizes = {(_samples(sweep.experiment.sample), _tests(sweep.experiment.test)) for _, sweep in sweeps}
+    amplitude = sweeps[0][1].experiment.test.amplitude
+    said = [note.format(paper=BEST_RMSE, amplitude=amplitude) for note in NOTES]
+    return said if sizes == {full} else [REDUCED, *said]
 
 
 def paper_table(sweeps: Sequence[tuple[str, Sweep]]) -> Table:
@@ -50,21 +50,22 @@ def paper_table(sweeps: Sequence[tuple[str, Sweep]]) -> Table:
     experiment = sweeps[0][1].experiment
     draw = experiment.reproduce.draws[0]
     rows = [
-        ["training samples", f"4·15^4 = {SAMPLES}", *(_samples(s) for _, s in sweeps)],
-        ["test trajectories", TESTS, *(_tests(s) for _, s in sweeps)],
+        [
+            "training samples",
+            f"4·15^4 = {_samples(GridSample())}",
+            *(_samples(s.experiment.sample) for _, s in sweeps),
+        ],
+        ["test trajectories", _tests(BoxSample()), *(_tests(s.experiment.test) for _, s in sweeps)],
     ]
+    best = " and ".join(map(str, BEST_ORDERS))
     for excitation in experiment.reproduce.excitations:
-        for order in PAPER_ORDERS:
+        for order in BEST_ORDERS:
             if order in experiment.reproduce.orders:
                 label = f"RMSE, order {order}, {INPUTS[excitation]}"
-                rows.append([label, PAPER_RMSE, *(score_text(s.rmse(draw, order, excitation)) for _, s in sweeps)])
-        rows.append(
-            [
-                f"order of the smallest mean, {excitation}",
-                "6 and 7",
-                *(_best(s, draw, excitation) for _, s in sweeps),
-            ]
-        )
+                scores = [score_text(s.figures(draw, order, excitation), unit=" %") for _, s in sweeps]
+                rows.append([label, f"{BEST_RMSE} %", *scores])
+        found = [_best(s, draw, excitation) for _, s in sweeps]
+        rows.append([f"order of the smallest mean, {INPUTS[excitation]}", best, *found])
     for kind, highest in (("random", 7), ("even", 10)):
         if kind in experiment.reproduce.draws:
             tried = max((order for order in experiment.reproduce.orders if order <= highest), default=0)
@@ -81,9 +82,10 @@ def order_tables(sweeps: Sequence[tuple[str, Sweep]]) -> list[Table]:
         rows = []
         for order in plan.orders:
             for i, (label, sweep) in enumerate(sweeps):
-                scores = [score_text(sweep.rmse(draw, order, e), unit="") for e in plan.excitations]
+                cells = [sweep.figures(draw, order, excitation) for excitation in plan.excitations]
+                functions = next((str(cell["functions"]) for cell in cells if cell is not None), "–")
                 name = str(order) if i == 0 else f"  {label}"
-                rows.append([name, str((order + 1) ** 3), *scores])
+                rows.append([name, functions, *map(score_text, cells)])
         title = f"RMSE in %, mean ± std (median), {draw} draw"
         tables.append(Table(title, ["order", "functions", *(INPUTS[e] for e in plan.excitations)], rows))
     return tables
@@ -107,38 +109,36 @@ def full_table(sweeps: Sequence[tuple[str, Sweep]]) -> Table:
     header += ["max yaw error (rad/s)", "diverged", "artefact"]
     rows = []
     for label, sweep in sweeps:
-        for (cell, figures), record in zip(sweep.figures.items(), sweep.records, strict=True):
-            rmse = figures["rmse"]
-            numbers = [rmse["mean"], rmse["std"], rmse["median"], rmse["max"]]
+        for scored in sweep.scored:
+            cell, figures = scored.cell, scored.figures
+            numbers = [figures["rmse"][statistic] for statistic in ("mean", "std", "median", "max")]
             numbers += [figures["rmse_relift"]["mean"], figures["rmse_printed"]["mean"]]
             numbers += [figures["max_error"]["yaw_rate"]]
             text = [f"{number:.4g}" for number in numbers]
             about = [label, cell.draw, str(cell.seed), str(cell.order), cell.excitation]
-            rows.append([*about, *text, str(figures["diverged"]), record.name])
+            rows.append([*about, *text, str(figures["diverged"]), scored.record.name])
     return Table("Every evaluation, RMSE in %", header, rows)
 
 
-def score_text(rmse: dict[str, float] | None, unit: str = " %") -> str:
-    """``mean ± std (median)`` to three digits."""
-    if rmse is None:
+def score_text(figures: Meta | None, unit: str = "") -> str:
+    """``mean ± std (median)`` of the RMSE to three digits."""
+    if figures is None:
         return "–"
+    rmse = figures["rmse"]
     return f"{rmse['mean']:.3g} ± {rmse['std']:.2g} ({rmse['median']:.3g}){unit}"
 
 
-def _samples(sweep: Sweep) -> str:
-    sample = sweep.experiment.sample
-    assert isinstance(sample, GridSample)
+def _samples(sample: GridSample | BoxSample) -> str:
     return f"{sample.trajectories:,}".replace(",", " ")
 
 
-def _tests(sweep: Sweep) -> str:
-    test = sweep.experiment.test
+def _tests(test: BoxSample) -> str:
     return f"{test.count:,} × {test.steps}".replace(",", " ")
 
 
 def _best(sweep: Sweep, draw: str, excitation: str) -> str:
-    scores = {order: sweep.rmse(draw, order, excitation) for order in sweep.experiment.reproduce.orders}
-    means = {order: score["mean"] for order, score in scores.items() if score is not None}
+    found = {order: sweep.figures(draw, order, excitation) for order in sweep.experiment.reproduce.orders}
+    means = {order: figures["rmse"]["mean"] for order, figures in found.items() if figures is not None}
     best = min(means, key=lambda order: means[order])
     return f"{best} ({means[best]:.3g} %)"
 

@@ -8,6 +8,7 @@ from koopcli.errors import InvalidValueError
 from koopcli.koopman.evaluation import Evaluation, evaluate, join
 from koopcli.records import Meta, Packed
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task
+from koopcli.stages.fit_edmd import functions
 
 
 def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
@@ -18,9 +19,14 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
 
     parts = context.chunks(len(trajectories), settings.chunk, score)
     result = join([Evaluation.unpack(part) for part in parts])
-    lost = int(result.diverged.sum())
-    if lost:
-        context.warn(f"{lost} of {len(result.diverged)} predictions diverged and are left out of the figures")
+    figures, n = result.figures(), len(result.diverged)
+    for name, what in (
+        ("diverged", "predictions diverged"),
+        ("diverged_relift", "re-lifted predictions diverged"),
+        ("undefined", "true trajectories are zero and have no relative error"),
+    ):
+        if figures[name]:
+            context.warn(f"{figures[name]} of {n} {what}; they are left out of the figures")
     return result
 
 
@@ -30,16 +36,15 @@ def _describe(figures: Meta) -> str:
 
 
 def _check(task: Task) -> None:
-    steps = dict(task.inputs)["trajectories"].settings.steps
+    steps = task.input("trajectories").settings.steps
     if task.settings.first > steps:
         raise InvalidValueError(f"'evaluate.first' must be at most the {steps} steps of the test set")
 
 
 def _estimate(task: Task) -> Cost:
-    test = dict(task.inputs)["trajectories"]
+    test, predictor = task.input("trajectories"), task.input("predictor")
     samples = test.ancestor("sample").settings.trajectories * test.settings.steps
-    order = task.ancestor("fit-edmd").settings.order
-    return Cost(6e-9 * samples * (order + 1) ** 3, 90.0 * test.ancestor("sample").settings.trajectories)
+    return Cost(6e-9 * samples * functions(predictor), 90.0 * test.ancestor("sample").settings.trajectories)
 
 
 STAGE = Stage(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from koopcli.checks import build
-from koopcli.config.settings import FitEdmd, GridSample
+from koopcli.config.settings import FitEdmd, GridSample, Simulate
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import edmd
 from koopcli.koopman.bases import BASES
@@ -11,7 +11,7 @@ from koopcli.koopman.predictor import Predictor
 from koopcli.records import Meta, Trajectories
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task
 from koopcli.store.files import size_text
-from koopcli.vehicles.single_track import ForceInput
+from koopcli.vehicles.plants import PLANTS
 
 FUNCTIONS_LIMIT = 4096
 
@@ -38,15 +38,21 @@ def _figures(predictor: Predictor) -> Meta:
     }
 
 
-def _functions(task: Task) -> int:
-    return BASES[task.settings.basis].count(task.settings.order, len(ForceInput.states))
+def functions(task: Task) -> int:
+    """Dimension of the lifted state of a fit."""
+    return BASES[task.settings.basis].count(task.settings.order, len(PLANTS[_plant(task)].states))
+
+
+def _plant(task: Task) -> str:
+    simulation = task.find("simulate")
+    return simulation.settings.plant if simulation is not None else Simulate.plant
 
 
 def _check(task: Task) -> None:
-    order, functions = task.settings.order, _functions(task)
-    if functions > FUNCTIONS_LIMIT:
+    order, N = task.settings.order, functions(task)
+    if N > FUNCTIONS_LIMIT:
         raise InvalidValueError(
-            f"'fit-edmd.order' {order} needs {functions:,} functions and {size_text(8.0 * functions**2)} for A alone; "
+            f"'fit-edmd.order' {order} needs {N:,} functions and {size_text(8.0 * N**2)} for A alone; "
             f"the limit is {FUNCTIONS_LIMIT:,} functions: lower the order"
         )
     sample = task.find("sample")
@@ -59,7 +65,7 @@ def _check(task: Task) -> None:
 
 
 def _estimate(task: Task) -> Cost:
-    N = _functions(task)
+    N = functions(task)
     sample, plant = task.ancestor("sample").settings, task.ancestor("simulate").settings
     samples = sample.trajectories * plant.steps
     crossed = isinstance(sample, GridSample) and plant.steps == 1

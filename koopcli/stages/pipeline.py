@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from koopcli.errors import DamagedArtefactError
+from koopcli.errors import DamagedArtefactError, InvalidValueError, NewerFormatError, UsageError
 from koopcli.records import Packed
 from koopcli.stages.base import Context, Cost, Reporter, Stage, Task
 from koopcli.stages.registry import STAGES
@@ -84,13 +84,25 @@ class Pipeline:
         """The task of the artefact named ``text``, with its inputs as far as their records are known."""
         return self._task(self.store.find(text))
 
+    def with_inputs(self, records: Sequence[Record]) -> list[Record]:
+        """``records`` and all that they were made from, as far as it is in the store."""
+        found: dict[str, Record] = {}
+        waiting = list(records)
+        while waiting:
+            record = waiting.pop()
+            if record.key not in found:
+                found[record.key] = record
+                inputs = (self.store.record(*name.split("/")) for name in record.lineage.values())
+                waiting += [one for one in inputs if one is not None]
+        return list(found.values())
+
     def _check(self, task: Task) -> None:
         for step in task.upstream():
             if step.key is None:
                 STAGES[step.stage].check(step)
 
     def _task(self, record: Record) -> Task:
-        settings = STAGES[record.stage].settings(record.recipe["settings"])
+        settings = settings_of(record)
         inputs = []
         for role, name in record.lineage.items():
             stage, _, key = name.partition("/")
@@ -147,6 +159,11 @@ class Pipeline:
         inputs = {role: self._obtain(upstream)[:2] for role, upstream in task.inputs}
         recipe = _recipe(task, {role: record for role, (record, _) in inputs.items()})
         key = key_of(recipe)
+        if task.key not in (None, key):
+            raise DamagedArtefactError(
+                f"{task.stage}/{(task.key or '')[:SHORT]} cannot be made again: what it was made from comes out "
+                "different here in its last bits; run its command afresh"
+            )
         with self.store.lock(key, f"{task.stage}/{key[:SHORT]}"):
             there = self.store.record(task.stage, key)
             found = self._read(task, there)
@@ -160,6 +177,10 @@ class Pipeline:
             seconds = time.perf_counter() - start
             lineage = {role: f"{record.stage}/{record.key}" for role, (record, _) in inputs.items()}
             made = self.store.commit(recipe, lineage, content.pack(), provenance(seconds))
+            if there is not None and there.data != made.data:
+                self.reporter.warn(
+                    f"{made.name} came out different in its last bits; what follows from it is made anew"
+                )
             parts.clear()
         # Go on with what a later process would read: the memory layout of an array moves the last bits of products.
         content = stage.unpack(self.store.read(made))
@@ -206,6 +227,23 @@ class _Chunks:
                     self.parts.commit(i, results[i])
             self.progress(rows.stop, count)
         return results
+
+
+def stage_of(record: Record) -> Stage:
+    """The stage that made ``record``. Raises ``NewerFormatError`` for one that this version does not have."""
+    if record.stage not in STAGES:
+        raise NewerFormatError(f"{record.name} is of a stage that this koop does not have: update koop")
+    return STAGES[record.stage]
+
+
+def settings_of(record: Record) -> Any:
+    """The settings in ``record``. Raises ``NewerFormatError`` when this version does not know them."""
+    try:
+        return stage_of(record).settings(record.recipe["settings"])
+    except (UsageError, InvalidValueError, KeyError, TypeError) as error:
+        raise NewerFormatError(
+            f"{record.name} has settings that this koop does not know ({error}): update koop"
+        ) from error
 
 
 def _recipe(task: Task, inputs: Mapping[str, Record]) -> dict[str, Any]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from koopcli.checks import build
 from koopcli.config.experiment import Experiment
-from koopcli.config.settings import BoxSample, GridSample, ImageFormat, Plot, Series
-from koopcli.errors import InvalidValueError, UnknownNameError
+from koopcli.config.settings import BoxSample, GridSample, ImageFormat, Plot, Series, Simulate
+from koopcli.errors import InvalidValueError
 from koopcli.figures import source_digest
+from koopcli.koopman.predictor import Predictor
 from koopcli.stages.base import Task
 
 FITS = ("fit-edmd",)
@@ -33,16 +35,20 @@ def fit_edmd(experiment: Experiment, of: Task | None = None) -> Task:
     return Task("fit-edmd", experiment.fit_edmd, (("trajectories", of or simulation(experiment)),))
 
 
-def test_set(experiment: Experiment, predictor: Task) -> Task:
-    """The test trajectories of ``predictor``: its own plant, vehicle and period, from the experiment's test states."""
-    plant = predictor.ancestor("simulate").settings
+def test_set(experiment: Experiment, plant: Simulate) -> Task:
+    """Test trajectories of ``plant``, with its vehicle and period, from the experiment's test states."""
     return Task("simulate", replace(plant, steps=experiment.test.steps), (("sample", sample(experiment.test)),))
 
 
+def remembered_plant(predictor: Predictor) -> Simulate:
+    """The plant that a predictor remembers, for when its trajectories are no longer in the store."""
+    return build(Simulate, {**predictor.plant, "dt": predictor.dt})
+
+
 def evaluation(experiment: Experiment, of: Task | None = None, on: Task | None = None) -> Task:
-    """The evaluation of a predictor on its test set or the trajectories given."""
+    """The evaluation of a predictor on the trajectories given, or on a test set of its own plant."""
     predictor = of or fit_edmd(experiment)
-    trajectories = on or test_set(experiment, predictor)
+    trajectories = on or test_set(experiment, predictor.ancestor("simulate").settings)
     return Task("evaluate", experiment.evaluate, (("predictor", predictor), ("trajectories", trajectories)))
 
 
@@ -73,13 +79,8 @@ def orders_figure(evaluations: Sequence[Task], image: ImageFormat) -> Task:
 
 
 def _series(task: Task) -> Series:
-    if task.stage != "evaluate":
-        raise UnknownNameError(f"the figure 'orders' takes evaluations, not an artefact of stage {task.stage}")
-    inputs = dict(task.inputs)
-    training, test = (
-        inputs["predictor"].ancestor("sample").settings,
-        inputs["trajectories"].ancestor("sample").settings,
-    )
+    predictor = task.input("predictor")
+    training, test = predictor.ancestor("sample").settings, task.input("trajectories").ancestor("sample").settings
     draw = f"{training.draw} {training.seed}" if isinstance(training, GridSample) else "box"
     excitation = test.excitation if isinstance(test, BoxSample) else "grid"
-    return Series(inputs["predictor"].ancestor("fit-edmd").settings.order, draw, excitation)
+    return Series(predictor.ancestor("fit-edmd").settings.order, draw, excitation)

@@ -26,24 +26,30 @@ class Cell:
 
 
 @dataclass(frozen=True)
+class Scored:
+    """A cell with the figures of its evaluation and the record that holds them."""
+
+    cell: Cell
+    figures: Meta
+    record: Record
+
+
+@dataclass(frozen=True)
 class Sweep:
-    """The figures of every cell, and the records that hold them."""
+    """Every cell of an experiment, scored."""
 
     experiment: Experiment
-    figures: dict[Cell, Meta]
-    records: tuple[Record, ...]
+    scored: tuple[Scored, ...]
 
-    def rmse(self, draw: str, order: int, excitation: str) -> Meta | None:
-        """{mean, std, median, max} in percent, if the sweep has the cell."""
-        for cell, figures in self.figures.items():
-            if (cell.draw, cell.order, cell.excitation) == (draw, order, excitation):
-                return dict(figures["rmse"])
-        return None
+    def figures(self, draw: str, order: int, excitation: str) -> Meta | None:
+        """The figures of a cell, if the sweep has it."""
+        wanted = (draw, order, excitation)
+        return next((s.figures for s in self.scored if (s.cell.draw, s.cell.order, s.cell.excitation) == wanted), None)
 
     def yaw_error(self, draw: str, highest: int) -> float | None:
         """Largest yaw-rate error in rad/s up to order ``highest``."""
-        errors = [f["max_error"]["yaw_rate"] for c, f in self.figures.items() if c.draw == draw and c.order <= highest]
-        return max(errors) if errors else None
+        chosen = (s for s in self.scored if s.cell.draw == draw and s.cell.order <= highest)
+        return max((s.figures["max_error"]["yaw_rate"] for s in chosen), default=None)
 
 
 def sweep_tasks(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
@@ -63,16 +69,14 @@ def sweep_tasks(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
 
 def run_sweep(experiment: Experiment, pipeline: Pipeline, label: str) -> Sweep:
     """Make or find every cell, with a progress display called ``label``."""
-    figures: dict[Cell, Meta] = {}
-    records: list[Record] = []
+    scored = []
     cells = list(sweep_tasks(experiment))
     with pipeline.reporter.progress(label) as progress:
         for i, (cell, task) in enumerate(cells):
             progress(i, len(cells))
             artefact = pipeline.make(task)
-            figures[cell] = artefact.figures
-            records.append(artefact.record)
-    return Sweep(experiment, figures, tuple(records))
+            scored.append(Scored(cell, artefact.figures, artefact.record))
+    return Sweep(experiment, tuple(scored))
 
 
 def sweep_figure(experiment: Experiment, pipeline: Pipeline, image: ImageFormat = "png") -> Artefact:

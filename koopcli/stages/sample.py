@@ -12,8 +12,8 @@ from koopcli.config.settings import SAMPLES, BoxSample, GridSample
 from koopcli.errors import InvalidValueError
 from koopcli.records import Meta, Sample
 from koopcli.simulation import sampling
-from koopcli.stages.base import Context, Cost, Inputs, Stage, Task
-from koopcli.vehicles.single_track import ForceInput
+from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
+from koopcli.vehicles.plants import PLANTS, SAMPLED_FOR
 
 
 def _settings(values: Mapping[str, Any]) -> GridSample | BoxSample:
@@ -21,34 +21,38 @@ def _settings(values: Mapping[str, Any]) -> GridSample | BoxSample:
 
 
 def _run(settings: GridSample | BoxSample, inputs: Inputs, context: Context) -> Sample:
-    states, n_u = ForceInput.states, len(ForceInput.inputs)
-    s = settings
+    plant, s = PLANTS[SAMPLED_FOR[settings.kind]], settings
+    n_u = len(plant.inputs)
+    factors: tuple[Any, ...] = ()
+    states = np.empty((0, len(plant.states)))
     if isinstance(s, GridSample):
         factors, u = sampling.grid(s.seed, s.box, s.count, s.draw, s.levels, s.columns, n_u)
-        return Sample(factors, np.empty((0, len(states))), u, True, states, ForceInput.inputs)
-    x0, u = sampling.box(s.seed, s.box, s.count, s.excitation, s.amplitude, s.steps, n_u)
-    return Sample((), x0, u, False, states, ForceInput.inputs)
+    else:
+        states, u = sampling.box(s.seed, s.box, s.count, s.excitation, s.amplitude, s.steps, n_u)
+    return Sample(factors, states, u, bool(factors), plant.states, plant.inputs)
 
 
 def _figures(sample: Sample) -> Meta:
-    states = len(sample.x0)
-    return {
-        "states": states,
-        "inputs": len(sample.inputs),
-        "trajectories": states * (sample.product or (1, 1))[1],
-    }
+    states, rows = sample.starts, len(sample.inputs)
+    return {"states": states, "inputs": rows, "trajectories": states * rows if sample.crossed else states}
 
 
 def _check(task: Task) -> None:
-    if len(task.settings.box) != len(ForceInput.states):
-        names = ", ".join(ForceInput.states.names)
-        raise InvalidValueError(f"'sample.box' must have one half-width for each of {names}, got {task.settings.box}")
+    names = PLANTS[SAMPLED_FOR[task.settings.kind]].states.names
+    if len(task.settings.box) != len(names):
+        raise InvalidValueError(
+            f"'sample.box' must have one half-width for each of {', '.join(names)}, got {task.settings.box}"
+        )
+    refuse_beyond_memory("the sample", _estimate(task).bytes, "sample.count")
 
 
 def _estimate(task: Task) -> Cost:
     s = task.settings
-    rows = len(s.levels) * s.columns if isinstance(s, GridSample) else s.count * (3 / 4 + s.steps)
-    return Cost(1e-7 * rows, 32.0 * rows)
+    if isinstance(s, GridSample):
+        numbers = s.count * len(s.box) + 4 * len(s.levels) * s.columns
+    else:
+        numbers = s.count * (len(s.box) + 4 * (s.steps if s.excitation == "fresh" else 1))
+    return Cost(2e-8 * numbers, 8.0 * numbers)
 
 
 STAGE = Stage(

@@ -11,7 +11,7 @@ from koopcli.config.settings import BoxSample, Simulate
 from koopcli.errors import InvalidValueError
 from koopcli.records import Meta, Sample, Trajectories
 from koopcli.simulation.integrate import simulate
-from koopcli.stages.base import Context, Cost, Inputs, Stage, Task
+from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
 from koopcli.vehicles.plants import PLANTS, WHEELS_PER_FORCE
 
 
@@ -49,6 +49,7 @@ def _check(task: Task) -> None:
             f"the sample holds fresh inputs for {sample.steps} steps, 'simulate.steps' is {steps}: "
             "sample again with more --steps"
         )
+    refuse_beyond_memory("the trajectories", _estimate(task).bytes, "the count or the steps")
 
 
 def _estimate(task: Task) -> Cost:

@@ -18,15 +18,33 @@ HOUR, DAY = 3600.0, 86400.0
 
 @contextmanager
 def storage_errors(path: Path, needed: int = 0) -> Iterator[None]:
-    """Turn an ``OSError`` at ``path`` into one line that says what failed, what was needed and what is free."""
+    """Turn an ``OSError`` of writing to ``path`` into one line: what failed, what was needed and what is free."""
     try:
         yield
     except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else str(error).splitlines()[0]
         room = f"{size_text(needed)} needed, {size_text(_free(path))} free"
         raise StorageError(
-            f"cannot write to the store at {path}: {reason} ({room}); free some space or choose another with --store"
+            f"cannot write to the store at {path}: {_reason(error)} ({room}); free some space or choose another "
+            "with --store"
         ) from error
+
+
+@contextmanager
+def reading_errors(path: Path) -> Iterator[None]:
+    """Turn an ``OSError`` of reading ``path`` into one line. A missing file stays what it is."""
+    try:
+        yield
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise StorageError(
+            f"cannot read {path}: {_reason(error)}; mend its permissions or choose another with --store"
+        ) from error
+
+
+def _reason(error: OSError) -> str:
+    text = os.strerror(error.errno) if error.errno else (str(error).splitlines() or ["unknown"])[0]
+    return f"{text}: {error.filename}" if error.filename else text
 
 
 def publish(target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path], None], temporary: Path) -> Path:
@@ -121,6 +139,7 @@ def _orphaned(name: str) -> bool:
 
 
 def _free(path: Path) -> int:
-    while not path.exists() and path != path.parent:
-        path = path.parent
-    return shutil.disk_usage(path).free
+    for folder in (path, *path.absolute().parents):
+        with suppress(OSError):
+            return shutil.disk_usage(folder).free
+    return 0

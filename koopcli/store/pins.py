@@ -33,13 +33,14 @@ def unpin(store: Store, label: str) -> None:
 
 
 def pins(store: Store) -> dict[str, list[str]]:
-    """label -> names "stage/key" that it keeps."""
-    found = {}
+    """label -> names "stage/key" that it keeps; a damaged pin keeps nothing and is warned about."""
+    found: dict[str, list[str]] = {}
     for path in sorted((store.root / "refs").glob("*.json")):
+        found[path.stem] = []
         try:
-            found[path.stem] = list(json.loads(path.read_text())["names"])
-        except (ValueError, KeyError, TypeError):
-            store.warn(f"the pin {path} is damaged: pin again")
+            found[path.stem] = [str(name) for name in json.loads(path.read_text())["names"]]
+        except (OSError, ValueError, KeyError, TypeError):
+            store.warn(f"the pin {path.stem} is damaged: `koop unpin {path.stem}`, and pin again")
     return found
 
 

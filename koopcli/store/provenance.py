@@ -27,7 +27,7 @@ def provenance(seconds: float) -> dict[str, Any]:
         "python": platform.python_version(),
         "versions": _versions(),
         "git": _git(),
-        "argv": sys.argv,
+        "argv": [text.encode("utf-8", "backslashreplace").decode() for text in sys.argv],
         "seconds": round(seconds, 3),
         "peak_memory_mb": round(peak / 1024, 1),
     }

@@ -6,8 +6,10 @@ refs/ (pins)   locks/   tmp/   quarantine/
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -24,17 +26,23 @@ from koopcli.errors import (
 )
 from koopcli.records import Packed
 from koopcli.store import image
-from koopcli.store.files import publish, sha256_file, storage_errors, sweep
+from koopcli.store.files import publish, reading_errors, sha256_file, storage_errors, sweep
 from koopcli.store.identity import data_digest
 from koopcli.store.records import SHORT, BadRecordError, Record
 
 LOCK_TIMEOUT = "KOOP_LOCK_TIMEOUT"
+WITHOUT_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL)
+KEY = re.compile(r"([0-9a-f]{64})\.json")
 CANDIDATES = 8
 
 
 def store_root(given: str | Path | None = None) -> Path:
     """The store's folder: ``given``, else ``$KOOP_STORE``, else ``./artefacts``."""
-    return Path(given or os.environ.get("KOOP_STORE") or "artefacts").expanduser()
+    text = str(given or os.environ.get("KOOP_STORE") or "artefacts")
+    try:
+        return Path(text).expanduser()
+    except RuntimeError as error:
+        raise StorageError(f"the store {text}: {error}") from error
 
 
 class Store:
@@ -44,44 +52,53 @@ class Store:
         self.root = root
         self.warn = warn
         self._swept = False
-        if root.exists() and not root.is_dir():
-            raise StorageError(f"the store {root} is not a folder: choose another with --store")
+        with reading_errors(root):
+            if root.exists() and not root.is_dir():
+                raise StorageError(f"the store {root} is not a folder: choose another with --store")
 
     # reading
 
     def record(self, stage: str, key: str) -> Record | None:
         """The record of ``key``, or None; a damaged one is put aside."""
-        path = self.root / "records" / stage / f"{key}.json"
+        path = self._record_path(stage, key)
         try:
-            text = path.read_bytes()
+            with reading_errors(path):
+                text = path.read_bytes()
         except FileNotFoundError:
             return None
-        except OSError as error:
-            raise StorageError(f"cannot read {path}: {error.strerror}") from error
         try:
             return Record.from_json(text, stage, key)
         except BadRecordError:
-            self.warn(f"the record of {stage}/{key[:SHORT]} is damaged and was put aside")
-            self._put_aside(path)
+            self.warn(f"the record of {stage}/{key[:SHORT]} is damaged {self._put_aside(path)}")
             return None
 
     def index(self) -> list[tuple[str, str]]:
         """(stage, key) of every record, by stage."""
-        return sorted((p.parent.name, p.stem) for p in (self.root / "records").glob("*/*.json"))
+        found = []
+        try:
+            with reading_errors(self.root):
+                for stage in os.scandir(self.root / "records"):
+                    if stage.is_dir():
+                        found += [(stage.name, KEY.fullmatch(file.name)) for file in os.scandir(stage)]
+        except FileNotFoundError:
+            return []
+        return sorted((stage, match[1]) for stage, match in found if match)
 
     def find(self, text: str) -> Record:
         """The record whose name or key starts with ``text``.
 
-        Raises ``UnknownNameError`` for none or several.
+        Raises ``UnknownNameError`` for none or several, ``DamagedArtefactError`` when its record does not read.
         """
         matches = [(s, k) for s, k in self.index() if text and (f"{s}/{k}".startswith(text) or k.startswith(text))]
         if len(matches) > 1:
             names = ", ".join(f"{stage}/{key[:SHORT]}" for stage, key in matches[:CANDIDATES])
             more = f" and {len(matches) - CANDIDATES} more" if len(matches) > CANDIDATES else ""
             raise UnknownNameError(f"'{text}' is ambiguous: {names}{more}")
-        record = self.record(*matches[0]) if matches else None
-        if record is None:
+        if not matches:
             raise UnknownNameError(f"there is no artefact '{text}' in {self.root}: `koop ls` lists what there is")
+        record = self.record(*matches[0])
+        if record is None:
+            raise DamagedArtefactError(f"the record of '{text}' is damaged, its recipe unknown: run its command afresh")
         return record
 
     def path(self, record: Record) -> Path:
@@ -90,39 +107,41 @@ class Store:
 
     def has_object(self, record: Record) -> bool:
         """Whether the object is there; a record without its object is a miss."""
-        return self.path(record).is_file()
+        with reading_errors(self.root):
+            return self.path(record).is_file()
 
     def read(self, record: Record) -> Packed:
         """The verified content. Raises ``DamagedArtefactError`` after putting a damaged object aside."""
         path = self.path(record)
         try:
-            if path.stat().st_size <= image.MEMORY_LIMIT:
-                content = path.read_bytes()
-                if hashlib.sha256(content).hexdigest() == record.object:
-                    return image.from_bytes(content)
-            elif sha256_file(path) == record.object:
-                return image.from_file(path)
+            with reading_errors(path):
+                if path.stat().st_size <= image.MEMORY_LIMIT:
+                    content = path.read_bytes()
+                    if hashlib.sha256(content).hexdigest() == record.object:
+                        return image.from_bytes(content)
+                elif sha256_file(path) == record.object:
+                    return image.from_file(path)
         except FileNotFoundError as error:
             raise DamagedArtefactError(f"the object of {record.name} is missing") from error
-        except OSError as error:
-            raise StorageError(f"cannot read {path}: {error.strerror or error}") from error
-        self._put_aside(path)
-        raise DamagedArtefactError(f"the object of {record.name} is damaged and was put aside")
+        raise DamagedArtefactError(f"the object of {record.name} is damaged {self._put_aside(path)}")
 
     # writing
 
     def commit(
-        self,
-        recipe: Mapping[str, Any],
-        lineage: Mapping[str, str],
-        packed: Packed,
-        provenance: Mapping[str, Any],
+        self, recipe: Mapping[str, Any], lineage: Mapping[str, str], packed: Packed, provenance: Mapping[str, Any]
     ) -> Record:
-        """Store ``packed`` under ``recipe``: the object first, the record last."""
+        """Store ``packed`` under ``recipe``: the object first, the record last.
+
+        Where locks do not hold, another process may have committed the same recipe meanwhile: the first record wins.
+        """
+        digest = data_digest(packed)
         path = self._put(packed, self._object_path)
-        record = Record(recipe, lineage, path.stem, path.stat().st_size, data_digest(packed), provenance)
+        record = Record(recipe, lineage, path.stem, path.stat().st_size, digest, provenance)
+        first = self.record(record.stage, record.key)
+        if first is not None and self.has_object(first):
+            return first
         with storage_errors(self.root):
-            self._publish(self.root / "records" / record.stage / f"{record.key}.json", record.to_json())
+            self._publish(self._record_path(record.stage, record.key), record.to_json())
         return record
 
     @contextmanager
@@ -136,13 +155,11 @@ class Store:
         except Timeout:
             self.warn(f"waiting for another process that is making {name}")
             self._wait(lock, name)
-        except NotImplementedError:
-            self.warn("this file system has no locks: two processes may make the same artefact twice")
-        except OSError as error:
-            if isinstance(error, PermissionError):
+        except (NotImplementedError, OSError) as error:
+            if isinstance(error, OSError) and error.errno not in WITHOUT_LOCKS:
                 with storage_errors(self.root):
                     raise
-            self.warn(f"no lock to be had here ({error.strerror}): two processes may make the same artefact twice")
+            self.warn("this file system has no locks: two processes may make the same artefact twice")
         try:
             yield
         finally:
@@ -186,11 +203,19 @@ class Store:
     def _object_path(self, digest: str) -> Path:
         return self.root / "objects" / digest[:2] / f"{digest}.h5"
 
-    def _put_aside(self, path: Path) -> None:
+    def _record_path(self, stage: str, key: str) -> Path:
+        return self.root / "records" / stage / f"{key}.json"
+
+    def _put_aside(self, path: Path) -> str:
+        """Move a damaged file to quarantine beside any earlier one; says what was done."""
         quarantine = self.root / "quarantine"
-        with suppress(OSError):  # a read-only store keeps its damage where it is
+        try:
             quarantine.mkdir(exist_ok=True)
-            os.replace(path, quarantine / path.name)
+            taken = len(list(quarantine.glob(f"{path.name}*")))
+            os.replace(path, quarantine / (f"{path.name}.{taken}" if taken else path.name))
+        except OSError:
+            return "and cannot be put aside in a read-only store"
+        return "and was put aside"
 
 
 class Parts:

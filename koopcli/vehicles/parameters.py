@@ -33,11 +33,11 @@ def read_vehicle(path: Path) -> VehicleParameters:
     here = from_file(path)
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a UTF-8 text"
-        raise InvalidValueError(here.say(f"cannot read the vehicle file: {reason}")) from error
     except tomllib.TOMLDecodeError as error:
         raise InvalidValueError(here.say(f"not valid TOML: {error}")) from error
+    except (OSError, ValueError, RecursionError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InvalidValueError(here.say(f"cannot read the vehicle file: {reason}")) from error
     for key in content:
         if key not in ("title", "source", "parameters"):
             raise InvalidValueError(here.say(f"unknown key '{key}' (known: title, source, parameters)"))

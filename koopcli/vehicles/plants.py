@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
 from koopcli.records import Channels, FloatArray
-from koopcli.vehicles.parameters import VehicleParameters
 from koopcli.vehicles.single_track import ForceInput
 
 
@@ -25,8 +23,10 @@ class Plant(Protocol):
         """dx/dt (..., n_x) at ``x`` (..., n_x) under ``u`` (..., n_u)."""
 
 
-PLANTS: dict[str, Callable[[VehicleParameters, int], Plant]] = {
+PLANTS: dict[str, type[ForceInput]] = {
     "forces": ForceInput,
 }
+
+SAMPLED_FOR = {"grid": "forces", "box": "forces"}  # the plant whose states and inputs a kind of sample draws
 
 WHEELS_PER_FORCE = {"axle": 1, "wheel": 2}

@@ -15,6 +15,7 @@ BAD_VEHICLE = '[parameters]\nm = { value = -1300.0, unit = "kg" }\n'
 
 
 def one_line(result, code, *parts):
+    """The failure is its last line on stderr; before it only notes and warnings."""
     assert result.code == code, result.err
     last = result.err.splitlines()[-1]
     assert last.startswith("koop: ")
@@ -40,6 +41,19 @@ def one_line(result, code, *parts):
         (["fit-edmd", "--order", "0"], 3, "'fit-edmd.order' must be at least 1"),
         (["fit-edmd", "--order", "40"], 3, "68,921 functions and 38.0 GB for A alone; the limit is 4,096 functions"),
         (["fit-edmd", "--order", "6"], 3, "5 values per state"),
+        (["fit-edmd", "--order", "9" * 400], 3, "'fit-edmd.order' must be at most 1000"),
+        (["simulate", "--set", "simulate.dt=1" + "0" * 400], 3, "'simulate.dt' must be a finite number"),
+        (["sample", "--set", "sample.seed=" + "9" * 5000], 3, "'sample.seed' must be a whole number"),
+        (["sample", "--set", "sample.levels=" + "[" * 3000], 3, "'sample.levels' must be a non-empty list"),
+        (["sample", "--set", "sample.kind=[1]"], 2, "unknown kind of sample [1]"),
+        (["sample", "--set", "sample.levels=[1e308]"], 3, "'sample.levels[0]' must be at most 1e+12"),
+        (["sample", "box", "--count", "100000000"], 3, "the sample would need"),
+        (["simulate", "--set", "sample.count=2000"], 3, "the trajectories would need"),
+        (["fit-edmd", "--vehicle", "x"], 2, "--vehicle"),
+        (["simulate", "--vehicle", "~nouser/x.toml"], 3, "~nouser/x.toml"),
+        (["simulate", "--vehicle", "x" * 300 + ".toml"], 3, "File name too long"),
+        (["sample", "--store", "~nouser/x"], 6, "~nouser/x"),
+        (["sample", "--store", "x" * 300], 6, "File name too long"),
         (["sample", "grid", "--count", "0"], 3, "'sample.count' must be at least 1"),
         (["sample", "box", "--amplitude", "nan"], 3, "'sample.amplitude' must be a finite number"),
         (["sample", "box", "--amplitude", "-1"], 3, "'sample.amplitude' must be at least 0"),
@@ -114,7 +128,8 @@ def test_an_ambiguous_name_lists_the_candidates(koop):
 
 
 def test_a_simulation_that_overflows(koop):
-    one_line(koop("simulate", "--set", "sample.kind=box", "--set", "sample.amplitude=1e300"), 3, "lower simulate.dt")
+    far = ["--set", "sample.kind=box", "--set", "sample.amplitude=1e12", "--dt", "10"]
+    one_line(koop("simulate", *far), 3, "lower simulate.dt")
 
 
 def test_a_damaged_artefact_is_rebuilt_with_a_warning_or_refused(koop, folder):
@@ -167,8 +182,12 @@ def test_a_read_only_store_still_serves_hits(koop, folder, monkeypatch):
     assert koop("show", name).code == 0
 
 
-def test_an_unwritable_picture(koop):
+def test_an_unwritable_picture(koop, folder):
     one_line(koop("plot", "orders", "-o", "no/such/folder/x.png"), 6, "no/such/folder")
+    assert not (folder / "artefacts").exists()
+    (folder / "x.png").mkdir()
+    one_line(koop("plot", "orders", "-o", "x.png"), 6, "x.png")
+    assert list(folder.glob(".x.png*")) == []
 
 
 def test_a_store_that_is_a_file(koop, folder):
@@ -190,6 +209,67 @@ def test_a_newer_format(koop, folder):
     (record,) = (folder / "artefacts" / "records" / "sample").iterdir()
     record.write_text(json.dumps({**json.loads(record.read_text()), "schema": 2}))
     one_line(koop("sample"), 8, "update koop")
+
+
+def test_junk_among_the_records_is_passed_over(koop, folder):
+    name = koop("sample").name
+    records = folder / "artefacts" / "records"
+    (records / "sample" / "notes.json").write_text("{}")
+    (records / "sample" / f"{'0' * 64}.json").mkdir()
+    (records / "file").write_text("")
+    assert koop("sample").name == name
+    one_line(koop("ls"), 6, "Is a directory")
+    (records / "sample" / f"{'0' * 64}.json").rmdir()
+    assert name in koop("ls").out
+    assert (records / "sample" / "notes.json").exists()
+
+
+def test_a_newer_record_is_passed_over_by_ls(koop, folder):
+    name = koop("sample").name
+    (record,) = (folder / "artefacts" / "records" / "sample").iterdir()
+    other = koop("sample", "--seed", "9").name
+    record.write_text(json.dumps({**json.loads(record.read_text()), "schema": 2}))
+    listed = koop("ls")
+    assert listed.code == 0
+    assert other in listed.out
+    assert name not in listed.out
+    assert "update koop" in listed.err
+
+
+def test_a_named_artefact_with_a_damaged_record(koop, folder):
+    name = koop("sample").name
+    (record,) = (folder / "artefacts" / "records" / "sample").iterdir()
+    record.write_text("{}")
+    one_line(koop("show", name), 5, "run its command afresh")
+
+
+def test_an_evaluation_whose_predictor_is_gone_cannot_be_drawn(koop, folder):
+    name = koop("evaluate").name
+    for path in (folder / "artefacts" / "records" / "fit-edmd").iterdir():
+        path.unlink()
+    one_line(koop("plot", "orders", name), 4, "the predictor behind evaluate/", "no longer in the store")
+
+
+def test_inputs_that_never_move_are_a_warning(koop):
+    done = koop("fit-edmd", "--set", "sample.columns=1", "--set", "sample.levels=[1.0]", "--json")
+    assert done.code == 0
+    assert json.loads(done.out)["condition"] is None
+    assert "the data determine 27 of 31 directions" in done.err
+
+
+def test_what_cannot_be_read_is_named(koop, folder, monkeypatch):
+    name = koop("sample").name
+    from pathlib import Path
+
+    real = Path.read_bytes
+
+    def refuse(self):
+        if self.suffix == ".h5":
+            raise PermissionError(errno.EACCES, "Permission denied", str(self))
+        return real(self)
+
+    monkeypatch.setattr(Path, "read_bytes", refuse)
+    one_line(koop("show", name), 6, "cannot read", "Permission denied", ".h5")
 
 
 def test_an_internal_error_is_the_only_traceback(monkeypatch, folder):

@@ -119,4 +119,41 @@ def test_a_closed_pipe_is_silent(folder):
     with start(folder, "ls", "--json") as process:
         process.stdout.close()
         err = process.stderr.read()
-    assert "Traceback" not in err
+    assert err == ""
+    assert process.returncode == 0
+
+
+def shell(folder: Path, command: str) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        ["bash", "-c", command.replace("koop", f"{sys.executable} -m koopcli")],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+def test_odd_streams_are_no_internal_error(folder):
+    full = shell(folder, "koop ls --json >/dev/full")
+    assert full.returncode == 6
+    assert full.stderr == "koop: cannot write the output: No space left on device\n"
+    for command in (
+        "koop ls >&-",
+        "koop fit-edmd --experiment ../tiny.toml 2>&-",
+        "PYTHONIOENCODING=latin-1 koop --help",
+        "LC_ALL=C PYTHONUTF8=0 koop fit-edmd --help",
+        "koop sample --store $'bad\\xff' --experiment ../tiny.toml",
+    ):
+        done = shell(folder, command)
+        assert done.returncode == 0, (command, done.stderr)
+        assert "Traceback" not in done.stderr
+
+
+def test_an_early_interrupt_is_answered_like_a_late_one(folder):
+    """From the first import of ours on; before that the interpreter itself answers."""
+    code = (
+        "import sys, signal, os; import koopcli.__main__ as m; "
+        "sys.meta_path.insert(0, type('F', (), {'find_spec': staticmethod("
+        "lambda name, *a: os.kill(os.getpid(), signal.SIGINT) if name == 'typer' else None)})); "
+        "sys.exit(m.main(['ls']))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 130
+    assert done.stderr == "koop: interrupted: nothing committed is lost; run the same command again to resume\n"

@@ -18,9 +18,11 @@ def test_the_table_the_report_and_the_pins(koop, folder):
     assert report.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
     for name in re.findall(r"evaluate/[0-9a-f]{12}", text):
         assert koop("path", name).code == 0
-    pinned = {row["name"] for row in json.loads(koop("ls", "evaluate", "--json").out) if row["pinned"]}
-    assert pinned == set(re.findall(r"evaluate/[0-9a-f]{12}", text))
-    assert len(pinned) == 2 * 2 * 2
+    assert len(set(re.findall(r"evaluate/[0-9a-f]{12}", text))) == 2 * 2 * 2
+    rows = json.loads(koop("ls", "--json").out)
+    assert {tuple(row["pins"]) for row in rows} == {(f"reproduce-{report.stem}",)}
+    assert f"pinned as reproduce-{report.stem}" in done.err
+    assert "not of the paper's size" in text
 
 
 def test_again_from_the_store_without_a_write(koop, folder):
@@ -57,7 +59,9 @@ def test_what_is_swept_cannot_be_set(koop):
         done = koop("reproduce", "--set", text)
         assert done.code == 2
         assert "--set 'reproduce." in done.err
-    assert koop("reproduce", "--set", "reproduce.orders=[1]", "--set", 'reproduce.draws=["even"]').code == 0
+    plan = koop("reproduce", "--set", " reproduce.orders=[1]", "--set", 'reproduce.draws=["even"]', "--json")
+    assert [run["run"] for run in json.loads(plan.out)["runs"]] == ["here"]
+    assert koop("reproduce", "--set", "reproduce.orders=[1, 1]").code == 3
 
 
 def test_dry_run_and_smoke(koop, folder):

@@ -74,6 +74,7 @@ def test_values_are_toml_or_plain_text():
         "test": {"amplitude": 1e3},
         "vehicle": {"name": "x"},
     }
+    assert parse_set(["vehicle.m=1\na=2"]) == {"vehicle": {"m": "1\na=2"}}  # one value, not two lines of TOML
 
 
 @pytest.mark.parametrize("text", ["sample", "sample.seed", "seed=1", ".seed=1", "sample.=1", "planet.mass=1"])
@@ -99,11 +100,17 @@ def test_a_vehicle_beside_the_experiment_file(tmp_path):
         ("[sample]\nsede = 1", "unknown setting 'sample.sede'"),
         ("[sample]\ndraw = 'odd'", "'sample.draw' cannot be 'odd'"),
         ("[sample]\nkind = 'ball'", "unknown kind of sample 'ball'"),
+        ("[sample]\nkind = ['grid']", "unknown kind of sample ['grid']"),
+        ("[sample]\nbox = [1e13, 1.0, 1.0]", "'sample.box[0]' must be at most 1e+12"),
+        ("[reproduce]\norders = [3, 3]", "'reproduce.orders' names a value twice"),
+        ("[simulate.vehicle]\nm = 1.0", "the vehicle has a section of its own"),
         ("[test]\ncount = 0", "'test.count' must be at least 1"),
         ("[test]\nkind = 'grid'", "'test.kind' cannot be 'grid'"),
         ("[vehicle]\nJzz = -1", "'vehicle.Jzz' must be above 0"),
         ("sample = 3", "must stand in a table"),
         ("[sample", "cannot read"),
+        ("[sample]\nseed = " + "9" * 5000, "cannot read"),
+        ("[sample]\nlevels = " + "[" * 3000, "cannot read"),
     ],
 )
 def test_a_bad_experiment_file_is_refused_by_file_and_key(tmp_path, text, says):
@@ -122,7 +129,6 @@ def test_an_unknown_experiment_lists_the_shipped_ones():
 
 def test_equal_samples_have_equal_settings():
     none = BoxSample(excitation="none")
-    assert BoxSample(excitation="none", amplitude=5.0, steps=50).settled() == none.settled()
-    assert BoxSample(excitation="held", steps=50).settled() == BoxSample(excitation="held").settled()
-    assert BoxSample(steps=50).settled() != BoxSample().settled()
+    assert BoxSample(excitation="none", amplitude=5.0).settled() == none.settled()
+    assert BoxSample(excitation="held", amplitude=5.0).settled() != BoxSample(excitation="held").settled()
     assert asdict(BoxSample().settled()) == asdict(BoxSample())

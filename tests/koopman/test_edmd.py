@@ -29,7 +29,8 @@ class Monomials:
 
     @property
     def constant(self):
-        return self.exponents.index((0,) * len(self.exponents[0]))
+        ones = (0,) * len(self.exponents[0])
+        return self.exponents.index(ones) if ones in self.exponents else None
 
     @property
     def state_map(self):
@@ -156,6 +157,49 @@ def test_a_raw_monomial_fit_predicts_the_same(plant):
     expected = np.stack(expected, axis=1)
     ours = predictor.predict(test.x[:, 0], test.u)
     assert np.abs(ours - expected).max() <= 1e-6 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        np.full((3, 2), 0.1),  # inputs that never move, and whose mean does not round to themselves
+        np.array([[1.0, 0.1], [2.0, 0.1], [4.0, 0.1]]),
+        np.array([[1.0, 2.0], [2.0, 4.0], [4.0, 8.0]]),
+    ],
+    ids=["constant", "one constant", "proportional"],
+)
+def test_inputs_that_determine_too_little_give_one_answer_by_either_path(columns):
+    """The direction that no input takes is dropped; product and blocks choose the same solution of least norm."""
+    rng = np.random.default_rng(13)
+    A, B = rng.standard_normal((3, 3)) / 3, rng.standard_normal((3, 2))
+    states = rng.standard_normal((40, 3))
+    x0, u = np.repeat(states, 3, axis=0), np.tile(columns[:, None], (40, 1, 1))
+    data = synthetic(lambda x, u: x @ A.T + u @ B.T, x0, u, (40, 3))
+    basis = Monomials(((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)))
+    product, blocks = edmd.fit(data, basis), edmd.fit(replace(data, product=None), basis)
+    assert product.rank == blocks.rank == 4 + np.linalg.matrix_rank(columns - columns.mean(axis=0), tol=1e-9)
+    assert pytest.approx(blocks.A, abs=1e-9) == product.A
+    assert pytest.approx(blocks.B, abs=1e-9) == product.B
+    assert product.predict(x0[:5], u[:5]) == pytest.approx(data.x[:5], abs=1e-9)
+    assert product.condition > 1e10
+
+
+def test_a_basis_from_many_rows_uses_a_spread_choice(monkeypatch, reduced):
+    """Regular data must not be subsampled in step with their own period."""
+    general = replace(reduced, product=None)
+    monkeypatch.setattr(edmd, "MARGINAL_ROWS", 2000)
+    basis = edmd.basis_from_data(general, "tensor", 8)  # all nine values of each state are found
+    assert basis.functions == 9**3
+    monkeypatch.setattr(edmd, "MARGINAL_ROWS", 10)
+    assert edmd.basis_from_data(reduced, "tensor", 8).functions == 9**3
+
+
+def test_long_trajectories_are_read_in_pieces(reduced):
+    rng = np.random.default_rng(14)
+    data = synthetic(lambda x, u: 0.9 * x + u, rng.standard_normal((2, 1)), rng.standard_normal((2, 1000, 1)))
+    sizes = [len(x) for x, _, _ in data.transitions(64)]
+    assert max(sizes) == 64
+    assert sum(sizes) == 2000
 
 
 def test_a_false_product_is_found_out(reduced):

@@ -51,6 +51,17 @@ def test_a_diverged_prediction_is_counted_and_left_out(pair):
     assert np.isfinite(figures["rmse"]["max"])
 
 
+def test_a_diverged_relift_is_counted_by_itself(pair):
+    predictor, test = pair
+    whole = evaluate(predictor, test, slice(None), 1)
+    some = np.zeros(50, dtype=bool)
+    some[:20] = True
+    figures = replace(whole, diverged_relift=some, rmse_relift=np.where(some, np.inf, whole.rmse_relift)).figures()
+    assert (figures["diverged"], figures["diverged_relift"]) == (0, 20)
+    assert figures["rmse_relift"]["max"] == whole.rmse_relift[20:].max()
+    assert evaluate(replace(predictor, A=1e6 * predictor.A), test, slice(None), 1).figures()["diverged_relift"] == 50
+
+
 def test_what_does_not_fit_is_refused(pair):
     predictor, test = pair
     with pytest.raises(InvalidValueError, match=r"steps by 0\.01 s, the trajectories by 0\.02 s"):

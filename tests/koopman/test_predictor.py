@@ -5,6 +5,7 @@ import pytest
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import edmd
+from koopcli.koopman import predictor as module
 from koopcli.koopman.predictor import Predictor
 from tests.conftest import grid_sample, trajectories_of
 
@@ -29,6 +30,20 @@ def test_the_fast_prediction_equals_the_rolled_one(predictor, start):
         rolled.append(z @ predictor.C.T)
     rolled[0] = predictor.lift(x0) @ predictor.C.T
     assert predictor.predict(x0, u) == pytest.approx(np.stack(rolled, axis=1), rel=1e-10, abs=1e-10)
+
+
+@pytest.mark.parametrize("segment", [1, 5, 12, 13])
+def test_the_length_of_a_segment_does_not_matter(predictor, start, segment, monkeypatch):
+    whole = predictor.predict(*start)
+    monkeypatch.setattr(module, "SEGMENT", segment)
+    assert predictor.predict(*start) == pytest.approx(whole, rel=1e-10, abs=1e-10)
+
+
+def test_an_infinite_condition_survives_storage(predictor):
+    from dataclasses import replace
+
+    again = Predictor.unpack(replace(predictor, condition=np.inf).pack())
+    assert np.isinf(again.condition)
 
 
 def test_one_trajectory_or_many(predictor, start):

@@ -40,6 +40,12 @@ def test_a_small_change_of_any_stage_is_found(stage, pins, monkeypatch):
         def __init__(self, made):
             self.made = made
 
+        def __getattr__(self, name):
+            return getattr(self.made, name)
+
+        def __len__(self):
+            return len(self.made)
+
         def pack(self):
             packed = self.made.pack()
             name = max(packed.arrays, key=lambda n: packed.arrays[n].values.size if n != "image" else 0)
@@ -49,6 +55,14 @@ def test_a_small_change_of_any_stage_is_found(stage, pins, monkeypatch):
     real = STAGES[stage]
     monkeypatch.setitem(STAGES, stage, replace(real, run=lambda *args: Off(real.run(*args))))
     assert "raise its version" in complaint(stage, pins)
+
+
+def test_a_changed_figure_is_found_too(pins, monkeypatch):
+    """What scripts read is pinned as well as the arrays."""
+    from koopcli.koopman import edmd
+
+    monkeypatch.setattr(edmd, "condition_number", lambda values: 2.0 * values.max() / values.min())
+    assert "raise its version" in complaint("fit-edmd", pins)
 
 
 def test_a_new_version_asks_for_a_new_pin(pins, monkeypatch):
