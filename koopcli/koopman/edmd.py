@@ -128,17 +128,21 @@ def _fit_product(trajectories: Trajectories, product: tuple[int, int], basis: Ba
     slopes = (left[:, keep] / singular[keep]) @ right[keep] / length  # Σ_j slopes_j u_jᵀ is the identity
     weights = np.column_stack([np.full(m, 1 / m), slopes])
     slope = np.zeros((columns.shape[1], basis.functions))
+    few = max(1, BLOCK // m)  # states whose successors are lifted together
 
     def rows() -> Iterator[tuple[FloatArray, FloatArray]]:
         slope[:] = 0
-        block = max(1, BLOCK // m)
-        for start in range(0, states, block):
-            stop = min(start + block, states)
-            x_next = trajectories.x[start * m : stop * m][:, 1].reshape(stop - start, m, -1)
-            moments = basis.group_moments(x_next, weights)
-            slope[:] += moments[:, 1:].sum(axis=0)
-            yield basis.lift(x[start:stop]), moments[:, 0]
-            progress(stop, states)
+        for start in range(0, states, BLOCK):
+            stop = min(start + BLOCK, states)
+            mean = np.empty((stop - start, basis.functions))
+            for first in range(start, stop, few):
+                last = min(first + few, stop)
+                x_next = trajectories.x[first * m : last * m][:, 1].reshape(last - first, m, -1)
+                moments = basis.group_moments(x_next, weights)
+                mean[first - start : last - start] = moments[:, 0]
+                slope[:] += moments[:, 1:].sum(axis=0)
+                progress(last, states)
+            yield basis.lift(x[start:stop]), mean
 
     solution = least_squares(rows)
     A, B = solution.coefficients.T.copy(), slope.T / states

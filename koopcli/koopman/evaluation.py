@@ -131,7 +131,7 @@ def join(parts: Sequence[Evaluation]) -> Evaluation:
         for field in fields(Evaluation)
         if isinstance(getattr(parts[0], field.name), np.ndarray)
     }
-    return replace(parts[0], **rows)
+    return replace(parts[0], **rows)  # type: ignore[arg-type]  # mypy does not pair names with types here
 
 
 def _check(predictor: Predictor, trajectories: Trajectories, first: int) -> None:
