@@ -10,7 +10,7 @@ from koopcli.config.settings import BoxSample, GridSample
 from koopcli.records import Meta
 from koopcli.stages.reproduction import Sweep
 
-INPUTS = {"none": "no input", "fresh": "inputs fresh at each step", "held": "inputs held"}
+INPUTS = {"none": "no input", "fresh": "fresh inputs", "held": "held inputs"}
 
 NOTES = (
     "The paper does not state the test inputs behind its {paper} %, so three kinds are scored: none, ±{amplitude:g} N "
@@ -65,11 +65,11 @@ def paper_table(sweeps: Sequence[tuple[str, Sweep]]) -> Table:
                 scores = [score_text(s.figures(draw, order, excitation), unit=" %") for _, s in sweeps]
                 rows.append([label, f"{BEST_RMSE} %", *scores])
         found = [_best(s, draw, excitation) for _, s in sweeps]
-        rows.append([f"order of the smallest mean, {INPUTS[excitation]}", best, *found])
+        rows.append([f"best order, {INPUTS[excitation]}", best, *found])
     for kind, highest in (("random", 7), ("even", 10)):
         if kind in experiment.reproduce.draws:
             tried = max((order for order in experiment.reproduce.orders if order <= highest), default=0)
-            label = f"largest yaw-rate error, {kind} draw, up to order {tried}"
+            label = f"yaw-rate error, {kind}, order ≤ {tried}"
             rows.append([label, "without error", *(_yaw(s, kind, highest) for _, s in sweeps)])
     return Table(f"Paper versus here ({draw} draw unless named)", ["", "paper", *(label for label, _ in sweeps)], rows)
 
@@ -84,10 +84,10 @@ def order_tables(sweeps: Sequence[tuple[str, Sweep]]) -> list[Table]:
             for i, (label, sweep) in enumerate(sweeps):
                 cells = [sweep.figures(draw, order, excitation) for excitation in plan.excitations]
                 functions = next((str(cell["functions"]) for cell in cells if cell is not None), "–")
-                name = str(order) if i == 0 else f"  {label}"
-                rows.append([name, functions, *map(score_text, cells)])
-        title = f"RMSE in %, mean ± std (median), {draw} draw"
-        tables.append(Table(title, ["order", "functions", *(INPUTS[e] for e in plan.excitations)], rows))
+                name = f"{order} ({functions})" if i == 0 else f"  {label}"
+                rows.append([name, *map(score_text, cells)])
+        title = f"RMSE in %, mean ± std (median), with N functions, {draw} draw"
+        tables.append(Table(title, ["order (N)", *(INPUTS[e] for e in plan.excitations)], rows))
     return tables
 
 
