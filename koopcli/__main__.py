@@ -35,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         _discard_stdout()
         return 0
     except OSError as error:
-        if error.filename is not None:
+        if error.filename is not None or error.errno is None:
             raise
         _discard_stdout()
         return _fail(f"cannot write the output: {error.strerror}", StorageError.exit_code)

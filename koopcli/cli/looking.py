@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from koopcli.cli.options import JsonOption, StoreOption, complete_name
-from koopcli.cli.session import open_store, print_json
+from koopcli.cli.session import brief, open_store, print_json
 from koopcli.console import Console, show_table
 from koopcli.errors import NewerFormatError, UnknownNameError
 
@@ -68,7 +68,7 @@ def ls(
             row["name"],
             row["made"].replace("T", " ")[:16],
             " ".join(row["pins"]),
-            _brief(row["settings"]),
+            brief(row["settings"]),
             f"{row['seconds']:.1f} s",
             size_text(row["bytes"]) if row["object"] else "missing",
         ]
@@ -208,11 +208,6 @@ def _rows(value: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
             yield name, " ".join(map(str, entry))
         else:
             yield name, f"{entry:.6g}" if isinstance(entry, float) else str(entry)
-
-
-def _brief(settings: dict[str, Any]) -> str:
-    """Settings in one short text, nested ones left out."""
-    return " ".join(f"{key}={value}" for key, value in settings.items() if not isinstance(value, (dict, list)))
 
 
 def _print_csv(artefact: Artefact) -> None:

@@ -10,7 +10,6 @@ from koopcli.cli.options import (
     DryRunOption,
     ExperimentOption,
     JsonOption,
-    SeedOption,
     SetOption,
     StoreOption,
     VehicleOption,
@@ -18,7 +17,7 @@ from koopcli.cli.options import (
     names,
 )
 from koopcli.cli.session import open_session
-from koopcli.config.experiment import Values
+from koopcli.config.experiment import Changes, Values
 from koopcli.config.settings import (
     BasisName,
     BoxSample,
@@ -32,7 +31,10 @@ from koopcli.config.settings import (
     Simulate,
 )
 
-TEST_SECTIONS = ("test", "evaluate")
+SAMPLE = ("sample",)
+SIMULATE = (*SAMPLE, "vehicle", "simulate")
+FIT_EDMD = (*SIMULATE, "fit-edmd")
+TEST = ("test", "evaluate")
 
 
 def sample(
@@ -40,7 +42,9 @@ def sample(
         Kind | None,
         typer.Argument(metavar=names(Kind), help="grid: the EDMD dataset (the default); box: test states."),
     ] = None,
-    seed: SeedOption = None,
+    seed: Annotated[
+        int | None, typer.Option(help=f"Seed of every draw (grid: {GridSample.seed}, box: {BoxSample.seed}).")
+    ] = None,
     count: Annotated[
         int | None, typer.Option(help=f"grid: values per state ({GridSample.count}); box: states ({BoxSample.count}).")
     ] = None,
@@ -73,7 +77,7 @@ def sample(
         "amplitude": amplitude,
         "steps": steps,
     }
-    session = open_session(store, experiment, set_, {"sample": given})
+    session = open_session(store, experiment, set_, SAMPLE, {"sample": given})
     from koopcli.stages import recipes
 
     session.run(recipes.sample(session.experiment.sample), as_json=as_json, dry_run=dry_run)
@@ -106,7 +110,7 @@ def simulate(
     Example: koop simulate --vehicle my-car.toml
     """
     given: Values = {"plant": plant, "steps": steps, "dt": dt, "force_per": force_per}
-    session = open_session(store, experiment, set_, {"simulate": given, "vehicle": {"name": vehicle}})
+    session = open_session(store, experiment, set_, SIMULATE, {"simulate": given, "vehicle": {"name": vehicle}})
     from koopcli.stages import recipes
 
     of = session.named(sample, ["sample"], "the SAMPLE", ("simulate", "vehicle")) if sample else None
@@ -119,6 +123,7 @@ def fit_edmd(
         typer.Argument(autocompletion=complete_name, help="Trajectories; made from the settings when left out."),
     ] = None,
     order: Annotated[int | None, typer.Option(help=f"Highest degree of each state ({FitEdmd.order}).")] = None,
+    vehicle: VehicleOption = None,
     basis: Annotated[
         BasisName | None, typer.Option(metavar=names(BasisName), help=f"Family of observables ({FitEdmd.basis}).")
     ] = None,
@@ -132,7 +137,8 @@ def fit_edmd(
 
     Example: koop fit-edmd --order 7
     """
-    session = open_session(store, experiment, set_, {"fit-edmd": {"order": order, "basis": basis}})
+    given: Changes = {"fit-edmd": {"order": order, "basis": basis}, "vehicle": {"name": vehicle}}
+    session = open_session(store, experiment, set_, FIT_EDMD, given)
     from koopcli.stages import recipes
 
     of = session.named(trajectories, ["simulate"], "the TRAJECTORIES", ("fit-edmd",)) if trajectories else None
@@ -157,7 +163,7 @@ def evaluate(
     ] = None,
     count: Annotated[int | None, typer.Option(help=f"Test trajectories ({BoxSample.count}).")] = None,
     steps: Annotated[int | None, typer.Option(help=f"Steps of each test trajectory ({BoxSample.steps}).")] = None,
-    seed: SeedOption = None,
+    seed: Annotated[int | None, typer.Option(help=f"Seed of the test set ({BoxSample.seed}).")] = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
@@ -171,12 +177,12 @@ def evaluate(
     Example: koop evaluate fit-edmd/3f2a --excitation held
     """
     given: Values = {"excitation": excitation, "amplitude": amplitude, "count": count, "steps": steps, "seed": seed}
-    session = open_session(store, experiment, set_, {"test": given})
+    session = open_session(store, experiment, set_, (*FIT_EDMD, *TEST), {"test": given})
     from koopcli.stages import recipes
 
     of = None
     if predictor:
-        of = session.named(predictor, recipes.FITS, "the PREDICTOR", TEST_SECTIONS)
+        of = session.named(predictor, recipes.FITS, "the PREDICTOR", TEST)
     elsewhere = [section for section in session.changes if section != "test"]
     test = session.named(on, ["simulate"], "--on", elsewhere) if on else None
     if of is not None and test is None and of.find("simulate") is None:

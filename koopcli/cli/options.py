@@ -36,8 +36,8 @@ SetOption = Annotated[
     typer.Option(
         "--set",
         metavar="STAGE.KEY=VALUE",
-        help="Change one setting of any stage, such as vehicle.Jzz=1731, sample.seed=1, test.excitation=held. "
-        "May be repeated.",
+        help="Change one setting of any stage behind this one, such as vehicle.Jzz=1731 or sample.box=[20,20,5]; "
+        "docs/cli.md lists them. May be repeated; the command's own options win.",
     ),
 ]
 ExperimentOption = Annotated[
@@ -46,6 +46,5 @@ ExperimentOption = Annotated[
 ]
 VehicleOption = Annotated[
     str | None,
-    typer.Option("--vehicle", metavar="NAME|FILE", help="A shipped vehicle or your own TOML file."),
+    typer.Option("--vehicle", metavar="NAME|FILE", help="A shipped vehicle (ctu-2020) or your own TOML file."),
 ]
-SeedOption = Annotated[int | None, typer.Option("--seed", help="Seed of every draw.", show_default=False)]

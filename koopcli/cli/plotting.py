@@ -11,6 +11,7 @@ import typer
 from koopcli.checks import candidates
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption, complete_name
 from koopcli.cli.session import open_session, print_json
+from koopcli.config.experiment import SECTIONS
 from koopcli.config.settings import FigureName, ImageFormat
 from koopcli.console import show_table
 from koopcli.errors import InvalidValueError, StorageError, UnknownNameError, UsageError
@@ -48,9 +49,9 @@ def plot(
     if figure not in get_args(FigureName):
         raise UnknownNameError(f"unknown figure '{figure}'{candidates(figure, get_args(FigureName))}")
     image = _format(output)
-    if output is not None and not os.access(output.parent, os.W_OK):
-        raise StorageError(f"cannot write {output}: {output.parent} is not a folder one can write to")
-    session = open_session(store, experiment, set_)
+    if output is not None and (output.is_dir() or not os.access(output.parent, os.W_OK)):
+        raise StorageError(f"cannot write {output}: name a file in a folder that can be written to")
+    session = open_session(store, experiment, set_, SECTIONS)
     from koopcli.stages import recipes
 
     if artefacts:

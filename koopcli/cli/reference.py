@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, fields
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import typer
 
 from koopcli.cli.app import app
+from koopcli.config.settings import BoxSample, Evaluate, FitEdmd, GridSample, Reproduce, Simulate
+from koopcli.vehicles.parameters import VehicleParameters
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+DECLARED: tuple[tuple[str, Any], ...] = (
+    ("vehicle", VehicleParameters),
+    ("sample", GridSample),
+    ("test", BoxSample),
+    ("simulate", Simulate),
+    ("fit-edmd", FitEdmd),
+    ("evaluate", Evaluate),
+    ("reproduce", Reproduce),
+)
 
 HEAD = """# Command reference
 
@@ -21,7 +32,36 @@ everything else on stderr; with `--json` it prints one JSON object.
 def reference() -> str:
     """The whole page as Markdown."""
     root: Any = typer.main.get_command(app)
-    return "\n".join([HEAD, *(line for name, command in root.commands.items() for line in _command(name, command))])
+    commands = [line for name, command in root.commands.items() for line in _command(name, command)]
+    return "\n".join([HEAD, *commands, *_settings(), ""])
+
+
+def _settings() -> Iterator[str]:
+    """Every setting that --set and an experiment file take, from the declarations themselves."""
+    yield "## Settings\n"
+    yield "For `--set SECTION.KEY=VALUE` and for experiment files; values are TOML. `vehicle.name` chooses a vehicle.\n"
+    yield "A sample of kind box takes what `test` takes.\n"
+    yield "| setting | default | allowed | meaning |\n|---|---|---|---|"
+    for section, cls in DECLARED:
+        hints = get_type_hints(cls)
+        for f in fields(cls):
+            if f.metadata:
+                default = "" if f.default is MISSING or f.default is None else _plain(f.default)
+                allowed = _allowed(hints[f.name], f.metadata)
+                yield f"| {section}.{f.name} | {default} | {allowed} | {f.metadata['help']} |"
+
+
+def _plain(value: Any) -> str:
+    return f"[{', '.join(map(str, value))}]" if isinstance(value, tuple) else str(value)
+
+
+def _allowed(kind: Any, bounds: Mapping[str, Any]) -> str:
+    if get_origin(kind) is tuple:
+        return f"list: {_allowed(get_args(kind)[0], bounds)}"
+    if get_origin(kind) is Literal:
+        return ", ".join(get_args(kind))
+    words = [("≥", bounds["low"]), (">", bounds["above"]), ("≤", bounds["high"])]
+    return " ".join([*(f"{sign} {value:g}" for sign, value in words if value is not None), bounds["unit"]]).strip()
 
 
 def _command(name: str, command: Any) -> Iterator[str]:

@@ -12,7 +12,7 @@ import typer
 
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption
 from koopcli.cli.session import Session, open_session, print_json, show_plan
-from koopcli.config.experiment import Experiment, load_experiment
+from koopcli.config.experiment import SECTIONS, Experiment, load_experiment
 from koopcli.console import show_table
 from koopcli.errors import UsageError
 
@@ -47,7 +47,7 @@ def reproduce(
     if smoke and experiment != "paper":
         raise UsageError("--smoke is an experiment of its own: leave out --experiment")
     base = "smoke" if smoke else experiment
-    session = open_session(store, base, set_)
+    session = open_session(store, base, set_, SECTIONS)
     changes = [f"{section}.{key}" for section, values in session.changes.items() for key in values]
     for name in changes:
         if name in SWEPT:
@@ -60,6 +60,9 @@ def reproduce(
         steps = {step.task: step for task in tasks for step in session.pipeline.plan(task)}
         show_plan(list(steps.values()), as_json=as_json)
         return
+    for _, one in runs:
+        for _, task in reproduction.sweep_tasks(one):
+            session.pipeline.check(task)
     sweeps = [(label, reproduction.run_sweep(one, session.pipeline, f"reproduce, {label}")) for label, one in runs]
     _finish(session, sweeps, as_json=as_json)
 
@@ -82,17 +85,20 @@ def _finish(session: Session, sweeps: list[tuple[str, Sweep]], *, as_json: bool)
     from koopcli.stages import comparison, reproduction
     from koopcli.store.pins import pin
 
-    figure = reproduction.sweep_figure(sweeps[-1][1].experiment, session.pipeline)
+    figures = [reproduction.sweep_figure(sweep.experiment, session.pipeline) for _, sweep in sweeps]
     tables = [comparison.paper_table(sweeps), *comparison.order_tables(sweeps)]
     for table in tables:
         show_table(table.header, table.rows, title=table.title, file=sys.stderr)
     for note in comparison.notes(sweeps):
         session.console.note(note)
     label = f"reproduce-edmd-{_identity(sweeps)}"
-    made = [scored.record for _, sweep in sweeps for scored in sweep.scored] + [figure.record]
+    made = [scored.record for _, sweep in sweeps for scored in sweep.scored]
+    made += [figure.record for figure in figures]
     pin(session.pipeline.store, label, session.pipeline.with_inputs(made))
     session.console.note(f"pinned as {label}")
-    path = _write_report(session, sweeps, [*tables, comparison.full_table(sweeps)], figure.content.image)
+    path = _write_report(
+        session, sweeps, [*tables, comparison.full_table(sweeps)], [figure.content.image for figure in figures]
+    )
     if as_json:
         print_json(
             {
@@ -110,7 +116,7 @@ def _identity(sweeps: Sequence[tuple[str, Sweep]]) -> str:
     return hashlib.sha256(names.encode()).hexdigest()[:12]
 
 
-def _write_report(session: Session, sweeps: list[tuple[str, Sweep]], tables: list[Table], image: bytes) -> Path:
+def _write_report(session: Session, sweeps: list[tuple[str, Sweep]], tables: list[Table], images: list[bytes]) -> Path:
     from koopcli.stages.comparison import notes
     from koopcli.store.files import publish, storage_errors
 
@@ -119,18 +125,15 @@ def _write_report(session: Session, sweeps: list[tuple[str, Sweep]], tables: lis
     lines = ["# EDMD: paper versus here", ""]
     for table in tables:
         lines += [f"## {table.title}", "", *_markdown(table), ""]
-    lines += [
-        "## What it means",
-        "",
-        *(f"* {note}" for note in notes(sweeps)),
-        "",
-        f"![RMSE against order]({path.stem}.png)",
-        "",
-    ]
+    lines += ["## What it means", "", *(f"* {note}" for note in notes(sweeps)), ""]
+    pictures = [path.with_name(f"{path.stem}-{i}.png") for i in range(len(images))]
+    for (label, _), picture in zip(sweeps, pictures, strict=True):
+        lines += [f"![RMSE against order, {label}]({picture.name})", "", f"RMSE against order: {label}", ""]
+    content = {path: "\n".join(lines).encode(), **dict(zip(pictures, images, strict=True))}
     with storage_errors(root):
-        for target, content in ((path, "\n".join(lines).encode()), (path.with_suffix(".png"), image)):
-            if not target.is_file() or target.read_bytes() != content:
-                publish(target, content, root / "tmp")
+        for target, what in content.items():
+            if not target.is_file() or target.read_bytes() != what:
+                publish(target, what, root / "tmp")
     return path
 
 

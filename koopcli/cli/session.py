@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,15 +60,27 @@ class Session:
 
 
 def open_session(
-    store: Path | None, experiment: str, assignments: Sequence[str] | None, options: Changes | None = None
+    store: Path | None,
+    experiment: str,
+    assignments: Sequence[str] | None,
+    sections: Sequence[str],
+    options: Changes | None = None,
 ) -> Session:
-    """A session; ``options`` of the command win over ``--set``, which wins over the experiment file."""
+    """A session; ``options`` of the command win over ``--set``, which wins over the experiment file.
+
+    ``sections``: those whose settings the command uses; ``--set`` of any other is refused.
+    """
     from koopcli.stages.pipeline import Pipeline
 
     changes = parse_set(assignments or [])
     for section, values in (options or {}).items():
         changes.setdefault(section, {}).update({key: v for key, v in values.items() if v is not None})
     changes = {section: values for section, values in changes.items() if values}
+    for section, values in changes.items():
+        if section not in sections:
+            raise UsageError(
+                f"--set {section}.{next(iter(values))} changes nothing here; this command uses {', '.join(sections)}"
+            )
     loaded = load_experiment(experiment, changes)
     console, shelf = open_store(store)
     return Session(Pipeline(shelf, console), console, loaded, changes)
@@ -104,16 +116,24 @@ def show_plan(steps: Sequence[Step], *, as_json: bool) -> None:
 
     seconds, size = sum(step.cost.seconds for step in steps), sum(step.cost.bytes for step in steps)
     if as_json:
-        rows = [{"name": step.name, "action": step.state, **vars(step.cost)} for step in steps]
+        rows = [
+            {"name": step.name, "action": step.state, **vars(step.cost), "settings": asdict(step.task.settings)}
+            for step in steps
+        ]
         print_json({"dry_run": True, "steps": rows, "seconds": round(seconds, 2), "bytes": round(size)})
         return
     table = []
     for step in steps:
         made = step.state == "make"
         cost = (f"{step.cost.seconds:.1f} s", size_text(step.cost.bytes)) if made else ("", "")
-        table.append([step.name, step.state, *cost])
-    table.append(["total, roughly", "", f"{seconds:.1f} s", size_text(size)])
-    show_table(["artefact", "would", "time", "size"], table, left=2)
+        table.append([step.name, step.state, brief(asdict(step.task.settings)), *cost])
+    table.append(["total, roughly", "", "", f"{seconds:.1f} s", size_text(size)])
+    show_table(["artefact", "would", "settings", "time", "size"], table, left=3)
+
+
+def brief(settings: dict[str, Any]) -> str:
+    """Settings in one short text, nested ones left out."""
+    return " ".join(f"{key}={value}" for key, value in settings.items() if not isinstance(value, (dict, list, tuple)))
 
 
 def _finite(value: Any) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TypeVar
 
@@ -82,7 +82,7 @@ def _toml_value(text: str) -> object:
 
 def _read(path: Path, here: Origin) -> Changes:
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError) as error:
         raise InvalidValueError(here.say(f"cannot read the experiment file: {error}")) from error
     for section, values in content.items():
@@ -110,6 +110,13 @@ def _sample(layers: Sequence[Layer]) -> GridSample | BoxSample:
             raise origin.misnamed(origin.say(f"unknown kind of sample {given!r}{candidates(str(given), SAMPLES)}"))
         if given != kind:
             kind, relevant = given, list(layers[i:])
+        for key in values.get("sample", {}):
+            owner = next((k for k, cls in SAMPLES.items() if key in {f.name for f in fields(cls)}), None)
+            if owner is not None and key not in {f.name for f in fields(SAMPLES[kind])}:
+                raise origin.misnamed(
+                    origin.say(f"'sample.{key}' belongs to kind '{owner}', this sample is of kind '{kind}'")
+                )
+        build(SAMPLES[kind], values.get("sample", {}), origin, "sample.")
     return _section(SAMPLES[kind], "sample", relevant)
 
 

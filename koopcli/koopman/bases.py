@@ -71,7 +71,9 @@ class TensorPolynomial:
         """ψ(x) (n, N) of the states (n, n_x)."""
         z = np.ones((len(x), 1))
         for i, axis in enumerate(self.axes):
-            z = (z[:, :, np.newaxis] * axis(x[:, i]).T[:, np.newaxis, :]).reshape(len(x), -1)
+            z = (z[:, :, np.newaxis] * axis(x[:, i]).T[:, np.newaxis, :]).reshape(
+                len(x), z.shape[1] * (axis.degree + 1)
+            )
         return z
 
     def group_moments(self, x: FloatArray, weights: FloatArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -42,7 +43,8 @@ class Predictor:
     def lift(self, x: FloatArray) -> FloatArray:
         """The lifted state z (..., N) of ``x`` (..., n_x)."""
         x = np.asarray(x, dtype=float)
-        return self.basis.lift(x.reshape(-1, x.shape[-1])).reshape(*x.shape[:-1], self.functions)
+        flat = x.reshape(math.prod(x.shape[:-1]), x.shape[-1])
+        return self.basis.lift(flat).reshape(*x.shape[:-1], self.functions)
 
     def predict(self, x0: FloatArray, u: FloatArray | None = None, steps: int | None = None) -> FloatArray:
         """The predicted states (..., steps+1, n_x), lifted once at ``x0`` (..., n_x).
@@ -52,19 +54,19 @@ class Predictor:
         """
         x0 = np.asarray(x0, dtype=float)
         if u is None:
-            if steps is None:
-                raise InvalidValueError("predict needs the inputs u or the number of steps")
+            if steps is None or steps < 0 or x0.ndim < 1:
+                raise InvalidValueError("predict needs states x0 and the inputs u or a number of steps")
             u = np.zeros((*x0.shape[:-1], steps, len(self.input_channels)))
         u = np.asarray(u, dtype=float)
-        wanted = (len(self.state_channels), len(self.input_channels), x0.shape[:-1])
-        if (x0.shape[-1], u.shape[-1], u.shape[:-2]) != wanted or steps not in (None, u.shape[-2]):
+        n_x, n_u = len(self.state_channels), len(self.input_channels)
+        fits = x0.ndim >= 1 and u.ndim == x0.ndim + 1 and u.shape[:-2] == x0.shape[:-1]
+        if not fits or (x0.shape[-1], u.shape[-1]) != (n_x, n_u) or steps not in (None, u.shape[-2]):
             raise InvalidValueError(
-                f"x0 {x0.shape} and u {u.shape} do not fit a predictor of {wanted[0]} states and {wanted[1]} inputs"
+                f"x0 {x0.shape} and u {u.shape} do not fit a predictor of {n_x} states and {n_u} inputs"
             )
-        batch = (int(np.prod(x0.shape[:-1])), u.shape[-2])
-        return response(self, self.lift(x0).reshape(batch[0], -1), u.reshape(*batch, -1)).reshape(
-            *x0.shape[:-1], batch[1] + 1, x0.shape[-1]
-        )
+        n, k = math.prod(x0.shape[:-1]), u.shape[-2]
+        x = response(self, self.lift(x0).reshape(n, self.functions), u.reshape(n, k, n_u))
+        return x.reshape(*x0.shape[:-1], k + 1, n_x)
 
     def step(self, x: FloatArray, u: FloatArray) -> FloatArray:
         """One step from the states ``x`` (n, n_x) lifted afresh, under ``u`` (n, n_u)."""
@@ -131,14 +133,16 @@ def response(predictor: Predictor, z0: FloatArray, u: FloatArray) -> FloatArray:
         for k in range(stop - start):
             observed[k] = rows
             rows = rows @ predictor.A
-        x[:, start:stop] = (z0 @ observed.reshape(-1, N).T).reshape(n, -1, n_x)
+        x[:, start:stop] = (z0 @ observed.reshape(-1, N).T).reshape(n, stop - start, n_x)
         markov[start : min(stop, steps)] = observed[: steps - start] @ predictor.B
     for first in range(0, steps, SEGMENT):  # the inputs of one segment ...
         inputs = u[:, first : first + SEGMENT]
         for later in range(first, steps, SEGMENT):  # ... act on its own samples and on those of every later one
             samples = min(SEGMENT, steps - later)
             acting = _toeplitz(markov, later - first, inputs.shape[1], samples)
-            x[:, later + 1 : later + 1 + samples] += (inputs.reshape(n, -1) @ acting).reshape(n, samples, n_x)
+            x[:, later + 1 : later + 1 + samples] += (inputs.reshape(n, inputs.shape[1] * n_u) @ acting).reshape(
+                n, samples, n_x
+            )
     return x
 
 

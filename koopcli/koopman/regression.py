@@ -16,7 +16,7 @@ from koopcli.records import FloatArray
 
 RowBlocks = Callable[[], Iterable[tuple[FloatArray, FloatArray]]]
 
-GRAM_CONDITION = 1e6  # of VᵀV: beyond it rounding would cost more than ten of sixteen digits
+GRAM_CONDITION = 1e6  # of VᵀV: up to it rounding leaves ten of sixteen digits
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,9 @@ def least_squares(blocks: RowBlocks) -> Solution:
     gram = cross = None
     rows = 0
     for V, Y in blocks():
-        gram = V.T @ V + (0 if gram is None else gram)
-        cross = V.T @ Y + (0 if cross is None else cross)
+        with np.errstate(over="ignore", invalid="ignore"):  # refused below, in words
+            gram = V.T @ V + (0 if gram is None else gram)
+            cross = V.T @ Y + (0 if cross is None else cross)
         rows += len(V)
     if gram is None or cross is None:
         raise InvalidValueError("there are no samples to fit")

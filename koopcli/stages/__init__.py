@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from koopcli.stages.pipeline import stage_of
+from koopcli.stages.pipeline import content_of
 from koopcli.store import Store, store_root
 
 
@@ -13,4 +13,4 @@ def read(name: str, store: str | Path | None = None) -> Any:
     """The record named ``name`` (or an unambiguous prefix), verified; see ``koopcli.load``."""
     shelf = Store(store_root(store))
     record = shelf.find(name)
-    return stage_of(record).unpack(shelf.read(record))
+    return content_of(record, shelf)

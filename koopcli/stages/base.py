@@ -86,7 +86,7 @@ class Task:
         return found
 
     def ancestor(self, stage: str) -> Task:
-        """The same, where nothing can be done without it. Raises ``UnknownNameError`` when its record is gone."""
+        """What :meth:`find` finds. Raises ``UnknownNameError`` when its record is gone."""
         found = self.find(stage)
         if found is None:
             name = f"{self.stage}/{(self.key or '')[:12]}"

@@ -13,8 +13,8 @@ from koopcli.stages.reproduction import Sweep
 INPUTS = {"none": "no input", "fresh": "fresh inputs", "held": "held inputs"}
 
 NOTES = (
-    "The paper does not state the test inputs behind its {paper} %, so three kinds are scored: none, ±{amplitude:g} N "
-    "redrawn at each step (fresh), and ±{amplitude:g} N held over the trajectory.",
+    "The paper does not state the test inputs behind its {paper} %, so three kinds are scored: none, ±{amplitude} N "
+    "redrawn at each step (fresh), and ±{amplitude} N held over the trajectory.",
     "The fall with the order is the truncation of exp(-i r t) in the yaw rate r. The floor with inputs is not the "
     "basis: a constant B cannot hold the products of an input with powers of r, and even the exact free response with "
     "the best constant input response scores the same. So {paper} % is a statement about unstated inputs.",
@@ -40,8 +40,8 @@ def notes(sweeps: Sequence[tuple[str, Sweep]]) -> list[str]:
     """What the tables mean, beginning with a word on runs of another size than the paper's."""
     full = (_samples(GridSample()), _tests(BoxSample()))
     sizes = {(_samples(sweep.experiment.sample), _tests(sweep.experiment.test)) for _, sweep in sweeps}
-    amplitude = sweeps[0][1].experiment.test.amplitude
-    said = [note.format(paper=BEST_RMSE, amplitude=amplitude) for note in NOTES]
+    amplitudes = dict.fromkeys(f"{sweep.experiment.test.amplitude:g}" for _, sweep in sweeps)
+    said = [note.format(paper=BEST_RMSE, amplitude=" or ".join(amplitudes)) for note in NOTES]
     return said if sizes == {full} else [REDUCED, *said]
 
 

@@ -7,7 +7,7 @@ from koopcli.config.settings import Evaluate
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.evaluation import Evaluation, evaluate, join
 from koopcli.records import Meta, Packed
-from koopcli.stages.base import Context, Cost, Inputs, Stage, Task
+from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
 from koopcli.stages.fit_edmd import functions
 
 
@@ -39,6 +39,9 @@ def _check(task: Task) -> None:
     steps = task.input("trajectories").settings.steps
     if task.settings.first > steps:
         raise InvalidValueError(f"'evaluate.first' must be at most the {steps} steps of the test set")
+    test = task.input("trajectories").find("sample")
+    rows = min(task.settings.chunk, test.settings.trajectories) if test is not None else task.settings.chunk
+    refuse_beyond_memory("a chunk", 24.0 * rows * functions(task.input("predictor")), "evaluate.chunk")
 
 
 def _estimate(task: Task) -> Cost:

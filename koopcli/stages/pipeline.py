@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from koopcli.errors import DamagedArtefactError, InvalidValueError, NewerFormatError, UsageError
+from koopcli.errors import DamagedArtefactError, InvalidValueError, NewerFormatError, UnknownNameError, UsageError
 from koopcli.records import Packed
 from koopcli.stages.base import Context, Cost, Reporter, Stage, Task
 from koopcli.stages.registry import STAGES
@@ -58,7 +58,7 @@ class Pipeline:
 
     def make(self, task: Task) -> Artefact:
         """The artefact of ``task``, from the store where possible; what is missing upstream is made first."""
-        self._check(task)
+        self.check(task)
         start = time.perf_counter()
         record, content, cached = self._obtain(task)
         return Artefact(record, content, cached, time.perf_counter() - start)
@@ -74,9 +74,13 @@ class Pipeline:
                 return
             for _, upstream in step.inputs:
                 visit(upstream)
-            steps[step] = Step(step, "make", f"{step.stage}/…", STAGES[step.stage].estimate(step))
+            try:
+                cost = STAGES[step.stage].estimate(step)
+            except UnknownNameError:  # something behind a named artefact is gone, which only an estimate needs
+                cost = Cost(0, 0)
+            steps[step] = Step(step, "make", f"{step.stage}/…", cost)
 
-        self._check(task)
+        self.check(task)
         visit(task)
         return list(steps.values())
 
@@ -96,7 +100,8 @@ class Pipeline:
                 waiting += [one for one in inputs if one is not None]
         return list(found.values())
 
-    def _check(self, task: Task) -> None:
+    def check(self, task: Task) -> None:
+        """Refuse a task that cannot work, without making anything."""
         for step in task.upstream():
             if step.key is None:
                 STAGES[step.stage].check(step)
@@ -145,7 +150,7 @@ class Pipeline:
         if record is None or not self.store.has_object(record):
             return None
         try:
-            content = STAGES[task.stage].unpack(self.store.read(record))
+            content = content_of(record, self.store)
         except DamagedArtefactError as error:
             self.reporter.warn(f"{error}; making it again")
             return None
@@ -183,7 +188,7 @@ class Pipeline:
                 )
             parts.clear()
         # Go on with what a later process would read: the memory layout of an array moves the last bits of products.
-        content = stage.unpack(self.store.read(made))
+        content = content_of(made, self.store)
         self._records[task] = made
         self._announce(made, f"made in {seconds:.1f} s: {stage.describe(stage.figures(content))}")
         return made, content, False
@@ -236,14 +241,28 @@ def stage_of(record: Record) -> Stage:
     return STAGES[record.stage]
 
 
+def content_of(record: Record, store: Store) -> Any:
+    """The verified content. Raises ``DamagedArtefactError`` when it is damaged or laid out by another version."""
+    packed = store.read(record)
+    try:
+        return stage_of(record).unpack(packed)
+    except (KeyError, TypeError, ValueError) as error:
+        raise DamagedArtefactError(f"{record.name} {_other_version(record)}") from error
+
+
 def settings_of(record: Record) -> Any:
     """The settings in ``record``. Raises ``NewerFormatError`` when this version does not know them."""
     try:
         return stage_of(record).settings(record.recipe["settings"])
     except (UsageError, InvalidValueError, KeyError, TypeError) as error:
-        raise NewerFormatError(
-            f"{record.name} has settings that this koop does not know ({error}): update koop"
-        ) from error
+        raise NewerFormatError(f"{record.name} {_other_version(record)} ({error})") from error
+
+
+def _other_version(record: Record) -> str:
+    written, here = record.recipe["version"], STAGES[record.stage].version
+    return (
+        f"was written by another koop (version {written} of its stage, here {here}): make it afresh or change versions"
+    )
 
 
 def _recipe(task: Task, inputs: Mapping[str, Record]) -> dict[str, Any]:

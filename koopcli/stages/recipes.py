@@ -24,9 +24,7 @@ def sample(settings: GridSample | BoxSample) -> Task:
 def simulation(experiment: Experiment, of: Task | None = None) -> Task:
     """Training trajectories, from the experiment's sample or the one given."""
     start = of or sample(experiment.sample)
-    steps = experiment.simulate.steps
-    if steps is None:
-        steps = experiment.sample.horizon if of is None else start.settings.horizon
+    steps = experiment.simulate.steps or start.settings.horizon
     return Task("simulate", replace(experiment.simulate, steps=steps), (("sample", start),))
 
 
@@ -71,8 +69,8 @@ def orders_figure(evaluations: Sequence[Task], image: ImageFormat) -> Task:
     for one in series:
         if series.count(one) > 1:
             raise InvalidValueError(
-                f"several evaluations of order {one.order}, draw {one.draw}, {one.excitation} inputs differ elsewhere: "
-                "name those of one experiment"
+                f"several evaluations of order {one.order}, draw {one.draw}, {one.excitation} inputs: name each once, "
+                "and those of one experiment"
             )
     settings = Plot("orders", image, series, source_digest())
     return Task("plot", settings, tuple((str(i), task) for i, task in enumerate(evaluations)))

@@ -53,8 +53,8 @@ class Store:
         self.warn = warn
         self._swept = False
         with reading_errors(root):
-            if root.exists() and not root.is_dir():
-                raise StorageError(f"the store {root} is not a folder: choose another with --store")
+            if not root.is_dir() and (root.exists() or root.is_symlink()):
+                raise StorageError(f"the store {root} is not a folder, or a link to none: choose another with --store")
 
     # reading
 
@@ -185,7 +185,16 @@ class Store:
         if not self._swept:
             self._swept = True
             sweep(temporary, final.stat().st_mtime)
+            self._sweep_chunks()
         return final
+
+    def _sweep_chunks(self) -> None:
+        """Remove chunks whose artefact is finished, which a process killed right after its commit leaves behind."""
+        finished = {key for _, key in self.index()}
+        with suppress(OSError):
+            for folder in (self.root / "partial").iterdir():
+                if folder.name in finished:
+                    self.parts(folder.name).clear()
 
     def _wait(self, lock: FileLock, name: str) -> None:
         text = os.environ.get(LOCK_TIMEOUT, "3600")

@@ -32,7 +32,7 @@ def read_vehicle(path: Path) -> VehicleParameters:
     """
     here = from_file(path)
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except tomllib.TOMLDecodeError as error:
         raise InvalidValueError(here.say(f"not valid TOML: {error}")) from error
     except (OSError, ValueError, RecursionError) as error:

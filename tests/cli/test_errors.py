@@ -32,7 +32,7 @@ def one_line(result, code, *parts):
         (["fti-edmd"], 2, "fti-edmd"),
         (["sample", "cube"], 2, "cube"),
         (["sample", "grid", "--draw", "odd"], 2, "odd"),
-        (["sample", "grid", "--excitation", "held"], 2, "unknown setting 'sample.excitation'"),
+        (["sample", "grid", "--excitation", "held"], 2, "'sample.excitation' belongs to kind 'box'"),
         (["fit-edmd", "--set", "fit-edmd.degree=3"], 2, "unknown setting 'fit-edmd.degree'"),
         (["fit-edmd", "--set", "nonsense"], 2, "--set stage.key=value"),
         (["fit-edmd", "--order", "x"], 2, "'--order'"),
@@ -49,7 +49,9 @@ def one_line(result, code, *parts):
         (["sample", "--set", "sample.levels=[1e308]"], 3, "'sample.levels[0]' must be at most 1e+12"),
         (["sample", "box", "--count", "100000000"], 3, "the sample would need"),
         (["simulate", "--set", "sample.count=2000"], 3, "the trajectories would need"),
-        (["fit-edmd", "--vehicle", "x"], 2, "--vehicle"),
+        (["evaluate", "--vehicle", "x"], 2, "--vehicle"),
+        (["sample", "--set", "vehicle.Jzz=5"], 2, "--set vehicle.Jzz changes nothing here; this command uses sample"),
+        (["fit-edmd", "--set", "test.count=7"], 2, "--set test.count changes nothing here"),
         (["simulate", "--vehicle", "~nouser/x.toml"], 3, "~nouser/x.toml"),
         (["simulate", "--vehicle", "x" * 300 + ".toml"], 3, "File name too long"),
         (["sample", "--store", "~nouser/x"], 6, "~nouser/x"),
@@ -118,7 +120,7 @@ def test_a_named_artefact_cannot_be_changed_after_the_fact(koop):
 
 def test_a_figure_does_not_mix_experiments(koop):
     one, two = koop("evaluate").name, koop("evaluate", "--set", "vehicle.Jzz=1731").name
-    one_line(koop("plot", "orders", one, two), 3, "several evaluations of order 2", "name those of one experiment")
+    one_line(koop("plot", "orders", one, two), 3, "several evaluations of order 2", "those of one experiment")
 
 
 def test_an_ambiguous_name_lists_the_candidates(koop):

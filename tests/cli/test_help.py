@@ -27,7 +27,7 @@ def test_the_command_reference_is_up_to_date():
     assert written == reference(), "run: make docs"
 
 
-def test_the_readme_and_the_docs_know_every_command():
+def test_the_readme_knows_every_command():
     text = (ROOT / "README.md").read_text()
     for name in COMMANDS:
         assert f"koop {name}" in text

@@ -94,6 +94,7 @@ def test_dry_run_makes_nothing(koop, folder):
     assert told.code == 0
     assert told.out.count("make") == 6
     assert "total, roughly" in told.out
+    assert "count=40" in told.out
     assert not (folder / "artefacts").exists()
     plan = json.loads(koop("evaluate", "--dry-run", "--json").out)
     assert plan["dry_run"]

@@ -11,11 +11,11 @@ def test_the_table_the_report_and_the_pins(koop, folder):
     assert done.code == 0
     report = folder / done.name
     text = report.read_text()
-    for part in ("paper", "11.1 %", "unstated inputs", "random draw", "even draw", f"]({report.stem}.png)"):
+    for part in ("paper", "11.1 %", "unstated inputs", "random draw", "even draw", f"]({report.stem}-0.png)"):
         assert part in text
     assert "Paper versus here" in done.err
     assert "No parameter was chosen" in done.err
-    assert report.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+    assert report.with_name(f"{report.stem}-0.png").read_bytes().startswith(b"\x89PNG")
     for name in re.findall(r"evaluate/[0-9a-f]{12}", text):
         assert koop("path", name).code == 0
     assert len(set(re.findall(r"evaluate/[0-9a-f]{12}", text))) == 2 * 2 * 2
@@ -43,7 +43,9 @@ def test_one_changed_assumption_beside_the_unmodified_run(koop, folder):
     assert len(here) == len(changed) == 8
     assert all(a["rmse"] != b["rmse"] for a, b in zip(here, changed, strict=True))
     text = (folder / both["path"]).read_text()
-    assert "vehicle.Jzz=1731" in text
+    assert "RMSE against order: vehicle.Jzz=1731" in text
+    amplitude = koop("reproduce", "--set", "test.amplitude=50")
+    assert "±10000 or 50 N" in amplitude.err
 
 
 def test_the_figures_of_the_report_are_those_of_evaluate(koop):
@@ -62,6 +64,12 @@ def test_what_is_swept_cannot_be_set(koop):
     plan = koop("reproduce", "--set", " reproduce.orders=[1]", "--set", 'reproduce.draws=["even"]', "--json")
     assert [run["run"] for run in json.loads(plan.out)["runs"]] == ["here"]
     assert koop("reproduce", "--set", "reproduce.orders=[1, 1]").code == 3
+
+
+def test_an_impossible_sweep_is_refused_before_anything_is_made(koop, folder):
+    assert koop("reproduce", "--set", "sample.count=2").code == 3
+    assert koop("reproduce", "--set", "sample.kind=box").code == 3
+    assert not (folder / "artefacts").exists()
 
 
 def test_dry_run_and_smoke(koop, folder):

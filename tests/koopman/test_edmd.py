@@ -121,7 +121,7 @@ def test_blocks_and_product_agree(reduced, order):
         assert np.abs(one - two).max() <= 1e-9 * np.abs(one).max()
     assert (blocks.C == product.C).all()
     assert blocks.rank == product.rank == basis.functions + 4
-    assert blocks.condition == pytest.approx(product.condition, rel=0.1)  # only the product path centres the inputs
+    assert blocks.condition == pytest.approx(product.condition, rel=0.1)
     assert (blocks.domain == product.domain).all()
 
 

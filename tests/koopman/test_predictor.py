@@ -65,11 +65,14 @@ def test_a_step_lifts_afresh(predictor, start):
 
 def test_shapes_that_do_not_fit_are_refused(predictor, start):
     x0, u = start
-    for bad in ((x0[:, :2], u), (x0, u[..., :2]), (x0[:3], u)):
+    for bad in ((x0[:, :2], u), (x0, u[..., :2]), (x0[:3], u), (x0, u[0, 0]), (5.0, u), (x0[0], u[0, 0])):
         with pytest.raises(InvalidValueError, match="do not fit a predictor of 3 states and 4 inputs"):
             predictor.predict(*bad)
-    with pytest.raises(InvalidValueError, match="steps"):
-        predictor.predict(x0)
+    for bad in ({}, {"steps": -1}):
+        with pytest.raises(InvalidValueError, match="steps"):
+            predictor.predict(x0, **bad)
+    assert predictor.predict(x0, steps=0) == pytest.approx(x0[:, np.newaxis], rel=1e-10)
+    assert predictor.predict(x0[:0], steps=3).shape == (0, 4, 3)
     with pytest.raises(InvalidValueError, match="do not fit"):
         predictor.predict(x0, u, steps=3)
 

@@ -11,7 +11,7 @@ from koopcli.errors import DamagedArtefactError, NewerFormatError, UnknownNameEr
 from koopcli.koopman import evaluation
 from koopcli.progress import silent
 from koopcli.records import Array, Packed
-from koopcli.stages import recipes
+from koopcli.stages import read, recipes
 from koopcli.stages.pipeline import Pipeline
 from koopcli.stages.registry import STAGES
 from koopcli.store import Store
@@ -193,7 +193,7 @@ def test_a_record_of_the_future_is_refused_by_name(fresh, store):
     other = store.commit({**recipe, "stage": "fit-edmd", "settings": {"warp": 9}}, {}, Packed({}), {})
     for record in (future, other):
         line, _ = fresh()
-        with pytest.raises(NewerFormatError, match="update koop"):
+        with pytest.raises(NewerFormatError, match=r"update koop|another koop"):
             line.named(record.name)
 
 
@@ -256,6 +256,28 @@ def test_the_plan_says_what_making_does(fresh):
     assert states["evaluate"] == "make"
     fresh()[0].make(task)
     assert [step.state for step in fresh()[0].plan(task)] == ["reuse"]
+
+
+def test_an_artefact_of_another_layout_is_refused_in_words(fresh, store):
+    made = fresh()[0].make(recipes.sample(experiment().sample)).record
+    recipe = {**made.recipe, "version": 0}
+    old = store.commit(recipe, {}, Packed({"x": Array(np.zeros(2), ("row",), "1")}), {})
+    line, _ = fresh()
+    with pytest.raises(DamagedArtefactError, match="another version made it"):
+        line.make(line.named(old.name))
+    with pytest.raises(DamagedArtefactError, match="version 0 of its stage, here 1"):
+        read(old.name, store.root)
+
+
+def test_the_plan_of_what_has_lost_its_past(fresh, store):
+    """Estimates need the sample behind the trajectories, making does not."""
+    made = fresh()[0].make(recipes.simulation(experiment())).record
+    for path in (store.root / "records" / "sample").iterdir():
+        path.unlink()
+    line, _ = fresh()
+    task = recipes.fit_edmd(experiment(), line.named(made.name))
+    assert [step.state for step in line.plan(task)] == ["reuse", "make"]
+    assert not line.make(task).cached
 
 
 def test_records_hold_where_they_came_from(fresh):

@@ -188,8 +188,10 @@ def test_a_full_disk_says_what_was_needed(store, monkeypatch):
 
 def test_a_store_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "x").write_text("")
-    with pytest.raises(StorageError, match="not a folder"):
-        Store(tmp_path / "x")
+    (tmp_path / "link").symlink_to("nowhere")
+    for name in ("x", "link"):
+        with pytest.raises(StorageError, match="not a folder"):
+            Store(tmp_path / name)
 
 
 def test_a_held_lock_times_out(store, monkeypatch):
@@ -229,6 +231,14 @@ def test_parts_are_verified_and_cleared(store):
     assert parts.read(10) is None
     parts.clear()
     assert not (store.root / "partial" / ("k" * 64)).exists()
+
+
+def test_chunks_of_a_finished_artefact_are_swept(store):
+    record = commit(store)
+    for key in (record.key, "k" * 64):
+        store.parts(key).commit(0, packed())
+    commit(Store(store.root), seed=5)
+    assert [path.name for path in (store.root / "partial").iterdir()] == ["k" * 64]
 
 
 def test_pins(store):
