@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from koopcli.cli.invocation import brief, open_store, print_json
 from koopcli.cli.options import JsonOption, StoreOption, complete_name
-from koopcli.cli.session import brief, open_store, print_json
 from koopcli.console import Console, show_table
 from koopcli.errors import NewerFormatError, UnknownNameError
 

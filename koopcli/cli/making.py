@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from koopcli.cli.invocation import begin
 from koopcli.cli.options import (
     DryRunOption,
     ExperimentOption,
@@ -16,7 +17,6 @@ from koopcli.cli.options import (
     complete_name,
     names,
 )
-from koopcli.cli.session import open_session
 from koopcli.config.experiment import Changes, Values
 from koopcli.config.settings import (
     BasisName,
@@ -77,10 +77,10 @@ def sample(
         "amplitude": amplitude,
         "steps": steps,
     }
-    session = open_session(store, experiment, set_, SAMPLE, {"sample": given})
+    call = begin(store, experiment, set_, SAMPLE, {"sample": given})
     from koopcli.stages import recipes
 
-    session.run(recipes.sample(session.experiment.sample), as_json=as_json, dry_run=dry_run)
+    call.run(recipes.sample(call.experiment.sample), as_json=as_json, dry_run=dry_run)
 
 
 def simulate(
@@ -110,11 +110,11 @@ def simulate(
     Example: koop simulate --vehicle my-car.toml
     """
     given: Values = {"plant": plant, "steps": steps, "dt": dt, "force_per": force_per}
-    session = open_session(store, experiment, set_, SIMULATE, {"simulate": given, "vehicle": {"name": vehicle}})
+    call = begin(store, experiment, set_, SIMULATE, {"simulate": given, "vehicle": {"name": vehicle}})
     from koopcli.stages import recipes
 
-    of = session.named(sample, ["sample"], "the SAMPLE", ("simulate", "vehicle")) if sample else None
-    session.run(recipes.simulation(session.experiment, of), as_json=as_json, dry_run=dry_run)
+    of = call.named(sample, ["sample"], "the SAMPLE", ("simulate", "vehicle")) if sample else None
+    call.run(recipes.simulation(call.experiment, of), as_json=as_json, dry_run=dry_run)
 
 
 def fit_edmd(
@@ -138,11 +138,11 @@ def fit_edmd(
     Example: koop fit-edmd --order 7
     """
     given: Changes = {"fit-edmd": {"order": order, "basis": basis}, "vehicle": {"name": vehicle}}
-    session = open_session(store, experiment, set_, FIT_EDMD, given)
+    call = begin(store, experiment, set_, FIT_EDMD, given)
     from koopcli.stages import recipes
 
-    of = session.named(trajectories, ["simulate"], "the TRAJECTORIES", ("fit-edmd",)) if trajectories else None
-    session.run(recipes.fit_edmd(session.experiment, of), as_json=as_json, dry_run=dry_run)
+    of = call.named(trajectories, ["simulate"], "the TRAJECTORIES", ("fit-edmd",)) if trajectories else None
+    call.run(recipes.fit_edmd(call.experiment, of), as_json=as_json, dry_run=dry_run)
 
 
 def evaluate(
@@ -177,18 +177,18 @@ def evaluate(
     Example: koop evaluate fit-edmd/3f2a --excitation held
     """
     given: Values = {"excitation": excitation, "amplitude": amplitude, "count": count, "steps": steps, "seed": seed}
-    session = open_session(store, experiment, set_, (*FIT_EDMD, *TEST), {"test": given})
+    call = begin(store, experiment, set_, (*FIT_EDMD, *TEST), {"test": given})
     from koopcli.stages import recipes
 
     of = None
     if predictor:
-        of = session.named(predictor, recipes.FITS, "the PREDICTOR", TEST)
-    elsewhere = [section for section in session.changes if section != "test"]
-    test = session.named(on, ["simulate"], "--on", elsewhere) if on else None
+        of = call.named(predictor, recipes.FITS, "the PREDICTOR", TEST)
+    elsewhere = [section for section in call.changes if section != "test"]
+    test = call.named(on, ["simulate"], "--on", elsewhere) if on else None
     if of is not None and test is None and of.find("simulate") is None:
-        plant = recipes.remembered_plant(session.pipeline.make(of).content)
-        test = recipes.test_set(session.experiment, plant)
-    session.run(recipes.evaluation(session.experiment, of, test), as_json=as_json, dry_run=dry_run)
+        plant = recipes.remembered_plant(call.pipeline.make(of).content)
+        test = recipes.test_set(call.experiment, plant)
+    call.run(recipes.evaluation(call.experiment, of, test), as_json=as_json, dry_run=dry_run)
 
 
 def register(app: typer.Typer) -> None:

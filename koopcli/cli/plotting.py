@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, get_args
 import typer
 
 from koopcli.checks import candidates
+from koopcli.cli.invocation import begin, print_json
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption, complete_name
-from koopcli.cli.session import open_session, print_json
 from koopcli.config.experiment import SECTIONS
 from koopcli.config.settings import FigureName, ImageFormat
 from koopcli.console import show_table
@@ -51,23 +51,23 @@ def plot(
     image = _format(output)
     if output is not None and (output.is_dir() or not os.access(output.parent, os.W_OK)):
         raise StorageError(f"cannot write {output}: name a file in a folder that can be written to")
-    session = open_session(store, experiment, set_, SECTIONS)
+    call = begin(store, experiment, set_, SECTIONS)
     from koopcli.stages import recipes
 
     if artefacts:
-        evaluations = [session.named(name, ["evaluate"], f"the figure '{figure}'", ()) for name in artefacts]
+        evaluations = [call.named(name, ["evaluate"], f"the figure '{figure}'", ()) for name in artefacts]
     else:
-        evaluations = recipes.order_sweep(session.experiment)
+        evaluations = recipes.order_sweep(call.experiment)
 
     def export(artefact: Artefact) -> None:
         if output is not None:
             _write(output, artefact.content.image)
-            session.console.note(f"wrote {output}")
+            call.console.note(f"wrote {output}")
         elif not as_json:
-            session.console.note("add -o FILE.png, .svg or .pdf to write the image")
+            call.console.note("add -o FILE.png, .svg or .pdf to write the image")
 
     task = recipes.orders_figure(evaluations, image)
-    session.run(task, as_json=as_json, dry_run=dry_run, extra=export)
+    call.run(task, as_json=as_json, dry_run=dry_run, extra=export)
 
 
 def _format(output: Path | None) -> ImageFormat:

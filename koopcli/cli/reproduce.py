@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from koopcli.cli.invocation import Invocation, begin, print_json, show_plan
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption
-from koopcli.cli.session import Session, open_session, print_json, show_plan
 from koopcli.config.experiment import SECTIONS, Experiment, load_experiment
 from koopcli.console import show_table
 from koopcli.errors import UsageError
@@ -47,57 +47,57 @@ def reproduce(
     if smoke and experiment != "paper":
         raise UsageError("--smoke is an experiment of its own: leave out --experiment")
     base = "smoke" if smoke else experiment
-    session = open_session(store, base, set_, SECTIONS)
-    changes = [f"{section}.{key}" for section, values in session.changes.items() for key in values]
+    call = begin(store, base, set_, SECTIONS)
+    changes = [f"{section}.{key}" for section, values in call.changes.items() for key in values]
     for name in changes:
         if name in SWEPT:
             raise UsageError(f"reproduce sweeps {name}: choose what it sweeps with --set '{SWEPT[name]}'")
     from koopcli.stages import reproduction
 
-    runs = _runs(session, base)
+    runs = _runs(call, base)
     if dry_run:
         tasks = [task for _, one in runs for _, task in reproduction.sweep_tasks(one)]
-        steps = {step.task: step for task in tasks for step in session.pipeline.plan(task)}
+        steps = {step.task: step for task in tasks for step in call.pipeline.plan(task)}
         show_plan(list(steps.values()), as_json=as_json)
         return
     for _, one in runs:
         for _, task in reproduction.sweep_tasks(one):
-            session.pipeline.check(task)
-    sweeps = [(label, reproduction.run_sweep(one, session.pipeline, f"reproduce, {label}")) for label, one in runs]
-    _finish(session, sweeps, as_json=as_json)
+            call.pipeline.check(task)
+    sweeps = [(label, reproduction.run_sweep(one, call.pipeline, f"reproduce, {label}")) for label, one in runs]
+    _finish(call, sweeps, as_json=as_json)
 
 
-def _runs(session: Session, base: str) -> list[tuple[str, Experiment]]:
+def _runs(call: Invocation, base: str) -> list[tuple[str, Experiment]]:
     """The unmodified experiment, and the modified one beside it; a change of the sweep itself applies to both."""
-    plan = {section: values for section, values in session.changes.items() if section == "reproduce"}
+    plan = {section: values for section, values in call.changes.items() if section == "reproduce"}
     changed = [
         f"{section}.{key}={value}"
-        for section, values in session.changes.items()
+        for section, values in call.changes.items()
         if section != "reproduce"
         for key, value in values.items()
     ]
     runs = [("here", load_experiment(base, plan))]
-    return [*runs, (" ".join(changed), session.experiment)] if changed else runs
+    return [*runs, (" ".join(changed), call.experiment)] if changed else runs
 
 
-def _finish(session: Session, sweeps: list[tuple[str, Sweep]], *, as_json: bool) -> None:
+def _finish(call: Invocation, sweeps: list[tuple[str, Sweep]], *, as_json: bool) -> None:
     """Tables on stderr, the same with all details in a file, its path on stdout."""
     from koopcli.stages import comparison, reproduction
     from koopcli.store.pins import pin
 
-    figures = [reproduction.sweep_figure(sweep.experiment, session.pipeline) for _, sweep in sweeps]
+    figures = [reproduction.sweep_figure(sweep.experiment, call.pipeline) for _, sweep in sweeps]
     tables = [comparison.paper_table(sweeps), *comparison.order_tables(sweeps)]
     for table in tables:
         show_table(table.header, table.rows, title=table.title, file=sys.stderr)
     for note in comparison.notes(sweeps):
-        session.console.note(note)
+        call.console.note(note)
     label = f"reproduce-edmd-{_identity(sweeps)}"
     made = [scored.record for _, sweep in sweeps for scored in sweep.scored]
     made += [figure.record for figure in figures]
-    pin(session.pipeline.store, label, session.pipeline.with_inputs(made))
-    session.console.note(f"pinned as {label}")
+    pin(call.pipeline.store, label, call.pipeline.with_inputs(made))
+    call.console.note(f"pinned as {label}")
     path = _write_report(
-        session, sweeps, [*tables, comparison.full_table(sweeps)], [figure.content.image for figure in figures]
+        call, sweeps, [*tables, comparison.full_table(sweeps)], [figure.content.image for figure in figures]
     )
     if as_json:
         print_json(
@@ -116,11 +116,11 @@ def _identity(sweeps: Sequence[tuple[str, Sweep]]) -> str:
     return hashlib.sha256(names.encode()).hexdigest()[:12]
 
 
-def _write_report(session: Session, sweeps: list[tuple[str, Sweep]], tables: list[Table], images: list[bytes]) -> Path:
+def _write_report(call: Invocation, sweeps: list[tuple[str, Sweep]], tables: list[Table], images: list[bytes]) -> Path:
     from koopcli.stages.comparison import notes
     from koopcli.store.files import publish, storage_errors
 
-    root = session.pipeline.store.root
+    root = call.pipeline.store.root
     path = root / "reports" / f"edmd-{_identity(sweeps)}.md"
     lines = ["# EDMD: paper versus here", ""]
     for table in tables:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Session:
+class Invocation:
     """The store, the console and the experiment of one command."""
 
     pipeline: Pipeline
@@ -59,14 +59,14 @@ class Session:
             print(artefact.record.name)
 
 
-def open_session(
+def begin(
     store: Path | None,
     experiment: str,
     assignments: Sequence[str] | None,
     sections: Sequence[str],
     options: Changes | None = None,
-) -> Session:
-    """A session; ``options`` of the command win over ``--set``, which wins over the experiment file.
+) -> Invocation:
+    """What a command works with; its ``options`` win over ``--set``, which wins over the experiment file.
 
     ``sections``: those whose settings the command uses; ``--set`` of any other is refused.
     """
@@ -83,7 +83,7 @@ def open_session(
             )
     loaded = load_experiment(experiment, changes)
     console, shelf = open_store(store)
-    return Session(Pipeline(shelf, console), console, loaded, changes)
+    return Invocation(Pipeline(shelf, console), console, loaded, changes)
 
 
 def open_store(store: Path | None) -> tuple[Console, Any]:
