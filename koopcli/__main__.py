@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 from collections.abc import Sequence
-from types import FrameType
 
 from koopcli.errors import InvalidValueError, KoopError, StorageError
+from koopcli.interrupts import TERMINATED, interruptible
 
 RESUME = "interrupted: nothing committed is lost; run the same command again to resume"
-INTERRUPTED, TERMINATED = 130, 143
+INTERRUPTED = 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     try:
-        signal.signal(signal.SIGTERM, _terminate)
-        _streams()
-        code = _run(argv)
-        sys.stdout.flush()
+        with interruptible():
+            _streams()
+            code = _run(argv)
+            sys.stdout.flush()
     except KoopError as error:
         return _fail(str(error), error.exit_code)
     except MemoryError as error:
@@ -77,10 +76,6 @@ def _fail(text: str, code: int) -> int:
     if text:
         print(f"koop: {' '.join(text.split())}", file=sys.stderr)
     return code
-
-
-def _terminate(signum: int, frame: FrameType | None) -> None:
-    raise SystemExit(TERMINATED)
 
 
 if __name__ == "__main__":

@@ -184,6 +184,11 @@ class Trajectories:
         """Steps of each trajectory."""
         return self.x.shape[1] - 1
 
+    @property
+    def factors(self) -> tuple[int, int] | None:
+        """``product``, where every trajectory is one step and its structure carries over to the transitions."""
+        return self.product if self.steps == 1 else None
+
     def transitions(self, rows: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
         """One-step pairs (x, u, x⁺) in blocks of at most ``rows``; no pair spans two trajectories."""
         n_x, n_u = self.x.shape[2], self.u.shape[2]

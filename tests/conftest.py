@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -66,11 +65,7 @@ def koop(folder, capsys):
         making = args and args[0] in ("sample", "simulate", "fit-edmd", "evaluate", "plot", "reproduce")
         extra = ["--experiment", "../tiny.toml"] if tiny and making else []
         capsys.readouterr()
-        before = signal.getsignal(signal.SIGTERM)
-        try:
-            code = main([*args, *extra])
-        finally:
-            signal.signal(signal.SIGTERM, before)
+        code = main([*args, *extra])
         captured = capsys.readouterr()
         return Result(code, captured.out, captured.err)
 

@@ -19,6 +19,9 @@ from koopcli.errors import InvalidValueError, StorageError, UnknownNameError, Us
 if TYPE_CHECKING:
     from koopcli.stages.pipeline import Artefact
 
+UNREAD = (("fit-edmd", "order"), ("reproduce", "draws"), ("reproduce", "excitations"))
+READ = "it sweeps reproduce.orders with sample.draw and test.excitation"
+
 
 def plot(
     figure: Annotated[str | None, typer.Argument(help="Name of the figure; --list shows them.")] = None,
@@ -57,6 +60,9 @@ def plot(
     if artefacts:
         evaluations = [call.named(name, ["evaluate"], f"the figure '{figure}'", ()) for name in artefacts]
     else:
+        for section, key in UNREAD:
+            if key in call.changes.get(section, {}):
+                raise UsageError(f"--set {section}.{key} changes nothing in the figure '{figure}': {READ}")
         evaluations = recipes.order_sweep(call.experiment)
 
     def export(artefact: Artefact) -> None:

@@ -32,8 +32,8 @@ def basis_from_data(trajectories: Trajectories, kind: str, order: int) -> Basis:
     A product dataset shows them in its states; of more than ``MARGINAL_ROWS`` other samples a spread choice shapes
     the basis, while the fit is over all of them.
     """
-    if trajectories.product is not None and trajectories.steps == 1:
-        x = _factors(trajectories, trajectories.product)[1]
+    if trajectories.factors is not None:
+        x = _factors(trajectories, trajectories.factors)[1]
     else:
         x = _spread_rows(trajectories)
     nodes = []
@@ -64,17 +64,14 @@ def fit(trajectories: Trajectories, basis: Basis, progress: Progress = silent) -
     which is the same minimum for a fraction of the work (4.5); any other dataset is read in blocks. Raises
     ``InvalidValueError`` for fewer samples than unknowns and for data that are not finite.
     """
-    samples, unknowns = (
-        len(trajectories) * trajectories.steps,
-        basis.functions + len(trajectories.input_channels),
-    )
-    if samples < unknowns:
+    samples, n_u = len(trajectories) * trajectories.steps, len(trajectories.input_channels)
+    if samples < basis.functions + n_u:
         raise InvalidValueError(
-            f"{samples} samples cannot determine {basis.functions} functions and "
-            f"{len(trajectories.input_channels)} inputs: lower the order or sample more"
+            f"{samples} samples cannot determine {basis.functions} functions and {n_u} inputs: "
+            "lower the order or sample more"
         )
-    if trajectories.product is not None and trajectories.steps == 1 and basis.constant is not None:
-        A, B, rank, condition = _fit_product(trajectories, trajectories.product, basis, progress)
+    if trajectories.factors is not None and basis.constant is not None:
+        A, B, rank, condition = _fit_product(trajectories, trajectories.factors, basis, progress)
     else:
         A, B, rank, condition = _fit_blocks(trajectories, basis, progress)
     return Predictor(

@@ -12,6 +12,7 @@ from koopcli.errors import InvalidValueError, UnknownNameError
 from koopcli.progress import Progress
 from koopcli.records import Meta, Packed
 from koopcli.store.files import size_text
+from koopcli.store.records import SHORT
 
 Inputs = Mapping[str, Any]  # role -> record
 MEMORY_SHARE = 0.4  # arrays are held about twice while they are made and stored
@@ -72,6 +73,11 @@ class Task:
     inputs: tuple[tuple[str, Task], ...] = ()
     key: str | None = None
 
+    @property
+    def name(self) -> str:
+        """The name of the artefact that was named; a task by its recipe has none yet."""
+        return f"{self.stage}/{self.key[:SHORT]}" if self.key else f"{self.stage}/…"
+
     def find(self, stage: str) -> Task | None:
         """The nearest task of ``stage`` upstream, this one included, if it is known."""
         return next((task for task in self.upstream() if task.stage == stage), None)
@@ -80,17 +86,14 @@ class Task:
         """The input ``role``. Raises ``UnknownNameError`` when its record is gone."""
         found = dict(self.inputs).get(role)
         if found is None:
-            raise UnknownNameError(
-                f"the {role} behind {self.stage}/{(self.key or '')[:12]} is no longer in the store: make it afresh"
-            )
+            raise UnknownNameError(f"the {role} behind {self.name} is no longer in the store: make it afresh")
         return found
 
     def ancestor(self, stage: str) -> Task:
         """What :meth:`find` finds. Raises ``UnknownNameError`` when its record is gone."""
         found = self.find(stage)
         if found is None:
-            name = f"{self.stage}/{(self.key or '')[:12]}"
-            raise UnknownNameError(f"the {stage} stage behind {name} is no longer in the store: make it afresh")
+            raise UnknownNameError(f"the {stage} stage behind {self.name} is no longer in the store: make it afresh")
         return found
 
     def upstream(self) -> Iterator[Task]:

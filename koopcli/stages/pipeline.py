@@ -78,7 +78,7 @@ class Pipeline:
                 cost = STAGES[step.stage].estimate(step)
             except UnknownNameError:  # something behind a named artefact is gone, which only an estimate needs
                 cost = Cost(0, 0)
-            steps[step] = Step(step, "make", f"{step.stage}/…", cost)
+            steps[step] = Step(step, "make", step.name, cost)
 
         self.check(task)
         visit(task)
@@ -166,7 +166,7 @@ class Pipeline:
         key = key_of(recipe)
         if task.key not in (None, key):
             raise DamagedArtefactError(
-                f"{task.stage}/{(task.key or '')[:SHORT]} cannot be made again: what it was made from comes out "
+                f"{task.name} cannot be made again: what it was made from comes out "
                 "different here in its last bits; run its command afresh"
             )
         with self.store.lock(key, f"{task.stage}/{key[:SHORT]}"):
@@ -200,7 +200,7 @@ class Pipeline:
         complete = record is not None and set(known) == set(record.lineage)
         if not complete or key_of(_recipe(task, known)) != task.key:
             raise DamagedArtefactError(
-                f"{task.stage}/{(task.key or '')[:SHORT]} is damaged and cannot be made again, because its inputs are "
+                f"{task.name} is damaged and cannot be made again, because its inputs are "
                 "gone or another version made it: run its command afresh"
             )
 

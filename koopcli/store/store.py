@@ -190,10 +190,10 @@ class Store:
 
     def _sweep_chunks(self) -> None:
         """Remove chunks whose artefact is finished, which a process killed right after its commit leaves behind."""
-        finished = {key for _, key in self.index()}
-        with suppress(OSError):
-            for folder in (self.root / "partial").iterdir():
-                if folder.name in finished:
+        for folder in (self.root / "partial").glob("*"):
+            for path in (self.root / "records").glob(f"*/{folder.name}.json"):
+                record = self.record(path.parent.name, folder.name)
+                if record is not None and self.has_object(record):  # without its object it is being made again
                     self.parts(folder.name).clear()
 
     def _wait(self, lock: FileLock, name: str) -> None:

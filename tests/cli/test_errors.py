@@ -37,6 +37,8 @@ def one_line(result, code, *parts):
         (["fit-edmd", "--set", "nonsense"], 2, "--set stage.key=value"),
         (["fit-edmd", "--order", "x"], 2, "'--order'"),
         (["plot"], 2, "orders"),
+        (["plot", "orders", "--set", "fit-edmd.order=3"], 2, "it sweeps reproduce.orders"),
+        (["plot", "orders", "--set", "reproduce.draws=['even']"], 2, "sample.draw"),
         (["fit-edmd", "--order", "-1"], 3, "'fit-edmd.order' must be at least 1"),
         (["fit-edmd", "--order", "0"], 3, "'fit-edmd.order' must be at least 1"),
         (["fit-edmd", "--order", "40"], 3, "68,921 functions and 38.0 GB for A alone; the limit is 4,096 functions"),

@@ -240,6 +240,15 @@ def test_the_reference_table_at_full_size(plant, tests, draw):
             assert figures["max_error"]["yaw_rate"] <= limit
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_yaw_rate_on_other_random_draws(plant, tests, seed):
+    """Rounding grows with the order and with how far the draw leaves the edges open; seed 2 is the worst of five."""
+    data = trajectories_of(plant, grid_sample(seed=seed), 1)
+    predictor = edmd.fit(data, edmd.basis_from_data(data, "tensor", 7))
+    for test in tests.values():
+        assert evaluate(predictor, test, slice(None), 1).figures()["max_error"]["yaw_rate"] <= 1e-6
+
+
 def test_yaw_rate_on_even_points_to_order_ten(plant, tests):
     data = trajectories_of(plant, grid_sample(draw="even"), 1)
     predictor = edmd.fit(data, edmd.basis_from_data(data, "tensor", 10))
