@@ -18,14 +18,17 @@ class Console:
 
     def __init__(self) -> None:
         self._bars: Bars | None = None
+        self._warned: set[str] = set()
 
     def note(self, text: str) -> None:
         """A plain line."""
         self._print(text)
 
     def warn(self, text: str) -> None:
-        """A line that says what may be wrong."""
-        self._print(f"warning: {text}")
+        """A line that says what may be wrong, once."""
+        if text not in self._warned:
+            self._warned.add(text)
+            self._print(f"warning: {text}")
 
     @contextmanager
     def progress(self, label: str) -> Iterator[Progress]:
@@ -75,10 +78,12 @@ def show_table(
     from rich.text import Text  # noqa: PLC0415
 
     target = file or sys.stdout
-    table = Table(title=title or None, box=SIMPLE, title_justify="left", title_style="bold", pad_edge=False)
+    table = Table(box=SIMPLE, pad_edge=False)
     for i, name in enumerate(header):
         table.add_column(Text(name), justify="left" if i < left else "right", overflow="fold")
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
-    width = None if target.isatty() else 400
-    RichConsole(file=target, width=width).print(table)
+    console = RichConsole(file=target, width=None if target.isatty() else 400)
+    if title:
+        console.print(Text(f"\n{title}", style="bold"))
+    console.print(table)

@@ -14,17 +14,28 @@ from koopcli.config.data import locate
 from koopcli.records import Sample, Trajectories
 from koopcli.simulation import sampling
 from koopcli.simulation.integrate import simulate
+from koopcli.stages.registry import STAGES
 from koopcli.store import Store
 from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
-from koopcli.vehicles.single_track import ForceInput
+from koopcli.vehicles.plants import Plant
+from koopcli.vehicles.single_track import ForceInput, SlipInput
 
 TINY = """
-[sample]
+[sample.grid]
 count = 5
 columns = 2
+[sample.ellipsoid]
+count = 25
+steps = 30
 [fit-edmd]
 order = 2
-[test]
+[fit-eigen]
+centres = 20
+tabulate = 0.2
+[test.box]
+count = 40
+steps = 5
+[test.ball]
 count = 40
 steps = 5
 [evaluate]
@@ -32,6 +43,9 @@ chunk = 10
 [reproduce]
 orders = [1, 2]
 excitations = ["none", "fresh"]
+seeds = [0, 1]
+cuts = [1e-8]
+mu_scales = [2.0]
 """
 
 
@@ -62,7 +76,7 @@ def koop(folder, capsys):
     """Run the command line here; `tiny=True` uses the tiny experiment."""
 
     def run(*args: str, tiny: bool = True) -> Result:
-        making = args and args[0] in ("sample", "simulate", "fit-edmd", "evaluate", "plot", "reproduce")
+        making = args and args[0] in (*STAGES, "reproduce")
         extra = ["--experiment", "../tiny.toml"] if tiny and making else []
         capsys.readouterr()
         code = main([*args, *extra])
@@ -93,9 +107,35 @@ def lopsided(vehicle) -> ForceInput:
     return ForceInput(change(vehicle, {"l_f": 1.1, "l_r": 1.6, "c_w": 0.4}, COMMAND_LINE))
 
 
-def trajectories_of(plant: ForceInput, sample: Sample, steps: int, dt: float = 0.01) -> Trajectories:
+@pytest.fixture(scope="session", params=["ctu-2020", "rimac-2018"])
+def slips(request) -> SlipInput:
+    """The plant on tyres, of both shipped vehicles."""
+    return SlipInput(read_vehicle(locate("vehicles", request.param, "vehicle")))
+
+
+@pytest.fixture(scope="session")
+def sliding(vehicle) -> SlipInput:
+    """The plant on tyres of the default vehicle."""
+    return SlipInput(vehicle)
+
+
+def surface_of(plant: Plant, count: int = 25, mesh: str = "sphere") -> Sample:
+    """Γ at 500 kJ."""
+    p = plant.parameters
+    states = sampling.MESHES[mesh](count) * sampling.semi_axes(5e5, p.m, p.Jzz)
+    return Sample((), states, np.zeros((count, 1, len(plant.inputs))), False, plant.states, plant.inputs)
+
+
+def ball_of(plant: Plant, count: int = 2000, seed: int = 0) -> Sample:
+    """States inside Γ."""
+    p = plant.parameters
+    states = sampling.ball(seed, count) * sampling.semi_axes(5e5, p.m, p.Jzz)
+    return Sample((), states, np.zeros((count, 1, len(plant.inputs))), False, plant.states, plant.inputs)
+
+
+def trajectories_of(plant: Plant, sample: Sample, steps: int, dt: float = 0.01) -> Trajectories:
     x0, u = sample.expand(steps)
-    x = simulate(plant.rhs, x0, u, dt)
+    x = simulate(plant.rhs, x0, u, dt, fastest_rate=plant.fastest_rate)
     return Trajectories(x, u, dt, plant.states, plant.inputs, sample.product)
 
 

@@ -9,7 +9,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from koopcli.config.experiment import Changes, Experiment, load_experiment, parse_set
+from koopcli.config.experiment import Changes, Experiment, flat, load_experiment, parse_set
+from koopcli.config.settings import UNUSED
 from koopcli.console import Console, show_table
 from koopcli.errors import UnknownNameError, UsageError
 
@@ -38,14 +39,16 @@ class Invocation:
             raise UnknownNameError(
                 f"{text} is an artefact of stage {task.stage}; {role} must be of stage {' or '.join(kinds)}"
             )
-        fixed = [f"{section}.{key}" for section in self.changes for key in self.changes[section]]
-        fixed = [name for name in fixed if name.partition(".")[0] not in unaffected]
+        fixed = [name for name, _ in flat(self.changes) if name.partition(".")[0] not in unaffected]
         if fixed:
             raise UsageError(f"{text} is made already: {', '.join(fixed)} cannot change it; leave out one or the other")
         return task
 
     def run(self, task: Task, *, as_json: bool, dry_run: bool, extra: Callable[[Artefact], None] | None = None) -> None:
         """Make ``task`` and print its name, or print the plan."""
+        for name, _ in flat(self.changes):
+            if idle := why_idle(name, self.experiment, [task]):
+                raise UsageError(f"{name} changes nothing here: {idle}")
         if dry_run:
             show_plan(self.pipeline.plan(task), as_json=as_json)
             return
@@ -76,14 +79,32 @@ def begin(
     for section, values in (options or {}).items():
         changes.setdefault(section, {}).update({key: v for key, v in values.items() if v is not None})
     changes = {section: values for section, values in changes.items() if values}
-    for section, values in changes.items():
-        if section not in sections:
-            raise UsageError(
-                f"--set {section}.{next(iter(values))} changes nothing here; this command uses {', '.join(sections)}"
-            )
+    for name, _ in flat(changes):
+        if name.partition(".")[0] not in sections:
+            raise UsageError(f"--set {name} changes nothing here; this command uses {', '.join(sections)}")
     loaded = load_experiment(experiment, changes)
     console, shelf = open_store(store)
     return Invocation(Pipeline(shelf, console), console, loaded, changes)
+
+
+def why_idle(name: str, experiment: Experiment, tasks: Sequence[Task]) -> str | None:
+    """Why the setting ``name`` has no effect on any of ``tasks``, or None where it has one."""
+    section, _, key = name.partition(".")
+    behind = [step for task in tasks for step in task.upstream()]
+    if section in ("vehicle", "simulate"):
+        plants = {step.settings.plant for step in behind if step.stage == "simulate"}
+        by_energy = any(hasattr(step.settings, key) or key == "name" for step in behind if step.stage == "sample")
+        if not plants and not by_energy:
+            return "only kinds of sample by kinetic energy depend on the vehicle, through its m and Jzz"
+        unused = [plant for plant in plants if any(f"{name}.".startswith(f"{one}.") for one in UNUSED[plant])]
+        if plants and len(unused) == len(plants):
+            return f"the plant '{unused[0]}' has no use for it"
+    for fit, settings in (("fit-edmd", experiment.fit_edmd), ("fit-eigen", experiment.fit_eigen)):
+        settled = settings.settled()
+        if section == fit and getattr(settled, key) != getattr(settings, key):
+            chosen = "basis" if fit == "fit-edmd" else "boundary"
+            return f"{fit}.{chosen} '{getattr(settings, chosen)}' has no use for it"
+    return None
 
 
 def open_store(store: Path | None) -> tuple[Console, Any]:

@@ -1,4 +1,4 @@
-"""The commands that make artefacts: sample, simulate, fit-edmd, evaluate."""
+"""The commands that make artefacts: sample, simulate, fit-edmd, fit-eigen, baseline, evaluate."""
 
 from __future__ import annotations
 
@@ -19,34 +19,54 @@ from koopcli.cli.options import (
 )
 from koopcli.config.experiment import Changes, Values
 from koopcli.config.settings import (
+    BallSample,
+    BaselineKind,
     BasisName,
+    Boundary,
     BoxSample,
     Draw,
+    EllipsoidSample,
     Excitation,
     FitEdmd,
+    FitEigen,
     ForcePer,
     GridSample,
     Kind,
+    LiftName,
+    Mesh,
     PlantName,
     Simulate,
 )
 
-SAMPLE = ("sample",)
-SIMULATE = (*SAMPLE, "vehicle", "simulate")
+SAMPLE = ("sample", "vehicle")
+SIMULATE = (*SAMPLE, "simulate")
 FIT_EDMD = (*SIMULATE, "fit-edmd")
+FIT_EIGEN = (*SIMULATE, "fit-eigen")
+BASELINE = (*SIMULATE, "baseline")
 TEST = ("test", "evaluate")
 
 
 def sample(
     kind: Annotated[
         Kind | None,
-        typer.Argument(metavar=names(Kind), help="grid: the EDMD dataset (the default); box: test states."),
+        typer.Argument(
+            metavar=names(Kind),
+            help="grid: the EDMD dataset (the default); box: test states for it; ellipsoid: Γ, the states of one "
+            "kinetic energy that eigenfunctions start from; ball: test states inside it.",
+        ),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(help=f"Seed of every draw (grid: {GridSample.seed}, box: {BoxSample.seed}).")
+        int | None,
+        typer.Option(
+            help=f"Seed of every draw (grid: {GridSample.seed}, box: {BoxSample.seed}, ball: {BallSample.seed})."
+        ),
     ] = None,
     count: Annotated[
-        int | None, typer.Option(help=f"grid: values per state ({GridSample.count}); box: states ({BoxSample.count}).")
+        int | None,
+        typer.Option(
+            help=f"grid: values per state ({GridSample.count}); else states (box: {BoxSample.count}, "
+            f"ellipsoid: {EllipsoidSample.count}, ball: {BallSample.count})."
+        ),
     ] = None,
     draw: Annotated[
         Draw | None, typer.Option(metavar=names(Draw), help=f"grid: how values are chosen ({GridSample.draw}).")
@@ -57,16 +77,29 @@ def sample(
     amplitude: Annotated[
         float | None, typer.Option(help=f"box: inputs within ± amplitude, in N ({BoxSample.amplitude:g}).")
     ] = None,
-    steps: Annotated[int | None, typer.Option(help=f"box: steps of each trajectory ({BoxSample.steps}).")] = None,
+    energy: Annotated[
+        float | None, typer.Option(help=f"ellipsoid, ball: (largest) kinetic energy in J ({EllipsoidSample.energy:g}).")
+    ] = None,
+    mesh: Annotated[
+        Mesh | None, typer.Option(metavar=names(Mesh), help=f"ellipsoid: points on it ({EllipsoidSample.mesh}).")
+    ] = None,
+    vehicle: VehicleOption = None,
+    steps: Annotated[
+        int | None,
+        typer.Option(
+            help=f"Steps of each trajectory (box: {BoxSample.steps}, ellipsoid: {EllipsoidSample.steps}, "
+            f"ball: {BallSample.steps})."
+        ),
+    ] = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
     dry_run: DryRunOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Draw initial states and inputs.
+    """Draw or lay out initial states and inputs.
 
-    Example: koop sample grid --draw even
+    Example: koop sample ellipsoid --mesh fibonacci
     """
     given: Values = {
         "kind": kind,
@@ -75,12 +108,14 @@ def sample(
         "draw": draw,
         "excitation": excitation,
         "amplitude": amplitude,
+        "energy": energy,
+        "mesh": mesh,
         "steps": steps,
     }
-    call = begin(store, experiment, set_, SAMPLE, {"sample": given})
+    call = begin(store, experiment, set_, SAMPLE, {"sample": given, "vehicle": {"name": vehicle}})
     from koopcli.stages import recipes
 
-    call.run(recipes.sample(call.experiment.sample), as_json=as_json, dry_run=dry_run)
+    call.run(recipes.sample(call.experiment.sample("grid")), as_json=as_json, dry_run=dry_run)
 
 
 def simulate(
@@ -88,16 +123,20 @@ def simulate(
         str | None, typer.Argument(autocompletion=complete_name, help="A sample; made from the settings when left out.")
     ] = None,
     plant: Annotated[
-        PlantName | None, typer.Option(metavar=names(PlantName), help=f"Equations of motion ({Simulate.plant}).")
+        PlantName | None,
+        typer.Option(
+            metavar=names(PlantName),
+            help="Equations of motion: tyre forces as inputs, or tyres with slip and steer (what the sample is for).",
+        ),
     ] = None,
     vehicle: VehicleOption = None,
     steps: Annotated[
         int | None, typer.Option(help="Steps of each trajectory (as the sample says; 1 for a grid).")
     ] = None,
-    dt: Annotated[float | None, typer.Option(help=f"Sampling period in s, one RK4 step ({Simulate.dt}).")] = None,
+    dt: Annotated[float | None, typer.Option(help=f"Sampling period in s ({Simulate.dt}).")] = None,
     force_per: Annotated[
         ForcePer | None,
-        typer.Option(metavar=names(ForcePer), help=f"What an input force acts on ({Simulate.force_per})."),
+        typer.Option(metavar=names(ForcePer), help=f"forces: what an input force acts on ({Simulate.force_per})."),
     ] = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
@@ -145,10 +184,98 @@ def fit_edmd(
     call.run(recipes.fit_edmd(call.experiment, of), as_json=as_json, dry_run=dry_run)
 
 
+def fit_eigen(
+    trajectories: Annotated[
+        str | None,
+        typer.Argument(autocompletion=complete_name, help="Trajectories; made from the settings when left out."),
+    ] = None,
+    degree: Annotated[
+        int | None, typer.Option(help=f"Most rates of the data in one sum: 1, 2, 3 give 4, 10, 20 ({FitEigen.degree}).")
+    ] = None,
+    boundary: Annotated[
+        Boundary | None,
+        typer.Option(
+            metavar=names(Boundary),
+            help="Values of the eigenfunctions on Γ: thin-plate splines, or the best for the data "
+            f"({FitEigen.boundary}).",
+        ),
+    ] = None,
+    centres: Annotated[int | None, typer.Option(help=f"thin-plate: number of splines ({FitEigen.centres}).")] = None,
+    cut: Annotated[
+        float | None,
+        typer.Option(
+            help="Smallest singular value kept, relative to the largest (1e-14 for thin-plate, rounding for optimal)."
+        ),
+    ] = None,
+    lift: Annotated[
+        LiftName | None, typer.Option(metavar=names(LiftName), help=f"How a state is looked up ({FitEigen.lift}).")
+    ] = None,
+    tabulate: Annotated[
+        float | None,
+        typer.Option(
+            help=f"Seconds of each trajectory that are looked up; the rest is the horizon ({FitEigen.tabulate:g})."
+        ),
+    ] = None,
+    vehicle: VehicleOption = None,
+    set_: SetOption = None,
+    experiment: ExperimentOption = "paper",
+    store: StoreOption = None,
+    dry_run: DryRunOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Fit a Koopman predictor whose lifted states are eigenfunctions, built from trajectories that start on a surface.
+
+    Example: koop fit-eigen --boundary optimal --cut 1e-10
+    """
+    fit: Values = {
+        "degree": degree,
+        "boundary": boundary,
+        "centres": centres,
+        "cut": cut,
+        "lift": lift,
+        "tabulate": tabulate,
+    }
+    call = begin(store, experiment, set_, FIT_EIGEN, {"fit-eigen": fit, "vehicle": {"name": vehicle}})
+    from koopcli.stages import recipes
+
+    of = call.named(trajectories, ["simulate"], "the TRAJECTORIES", ("fit-eigen",)) if trajectories else None
+    call.run(recipes.fit_eigen(call.experiment, of), as_json=as_json, dry_run=dry_run)
+
+
+def baseline(
+    kind: Annotated[
+        BaselineKind,
+        typer.Argument(
+            metavar=names(BaselineKind),
+            help="hold: the first state; rotation: turned at its yaw rate; linearisation: of the plant at it.",
+        ),
+    ],
+    trajectories: Annotated[
+        str | None,
+        typer.Argument(autocompletion=complete_name, help="Trajectories it is set beside; made when left out."),
+    ] = None,
+    vehicle: VehicleOption = None,
+    set_: SetOption = None,
+    experiment: ExperimentOption = "paper",
+    store: StoreOption = None,
+    dry_run: DryRunOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Make a prediction that fits nothing, to evaluate beside predictors: what any predictor has to beat.
+
+    Example: koop evaluate $(koop baseline rotation)
+    """
+    call = begin(store, experiment, set_, BASELINE, {"baseline": {"kind": kind}, "vehicle": {"name": vehicle}})
+    from koopcli.stages import recipes
+
+    of = call.named(trajectories, ["simulate"], "the TRAJECTORIES", ("baseline",)) if trajectories else None
+    call.run(recipes.baseline(call.experiment, of), as_json=as_json, dry_run=dry_run)
+
+
 def evaluate(
     predictor: Annotated[
         str | None,
-        typer.Argument(autocompletion=complete_name, help="A predictor; made from the settings when left out."),
+        typer.Argument(autocompletion=complete_name, help="A predictor; fit-edmd makes one when left out."),
     ] = None,
     on: Annotated[
         str | None,
@@ -156,22 +283,29 @@ def evaluate(
     ] = None,
     excitation: Annotated[
         Excitation | None,
-        typer.Option(metavar=names(Excitation), help=f"Inputs of the test set ({BoxSample.excitation})."),
+        typer.Option(metavar=names(Excitation), help=f"forces: inputs of the test set ({BoxSample.excitation})."),
     ] = None,
     amplitude: Annotated[
-        float | None, typer.Option(help=f"Test inputs within ± amplitude, in N ({BoxSample.amplitude:g}).")
+        float | None, typer.Option(help=f"forces: test inputs within ± amplitude, in N ({BoxSample.amplitude:g}).")
     ] = None,
-    count: Annotated[int | None, typer.Option(help=f"Test trajectories ({BoxSample.count}).")] = None,
-    steps: Annotated[int | None, typer.Option(help=f"Steps of each test trajectory ({BoxSample.steps}).")] = None,
-    seed: Annotated[int | None, typer.Option(help=f"Seed of the test set ({BoxSample.seed}).")] = None,
+    count: Annotated[
+        int | None, typer.Option(help=f"Test trajectories (forces: {BoxSample.count}, slips: {BallSample.count}).")
+    ] = None,
+    steps: Annotated[
+        int | None, typer.Option(help=f"Steps of each (forces: {BoxSample.steps}, slips: {BallSample.steps}).")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help=f"Seed of the test set (forces: {BoxSample.seed}, slips: {BallSample.seed}).")
+    ] = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
     dry_run: DryRunOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Score a predictor on test trajectories of its own vehicle: RMSE, re-lifted RMSE, largest errors.
+    """Score a predictor on test trajectories of its own plant and vehicle: RMSE, re-lifted RMSE, largest errors.
 
+    The plant names the test set: a box of states with inputs for forces, the states inside Γ without inputs for slips.
     An interrupted evaluation goes on where it stopped.
 
     Example: koop evaluate fit-edmd/3f2a --excitation held
@@ -186,8 +320,8 @@ def evaluate(
     elsewhere = [section for section in call.changes if section != "test"]
     test = call.named(on, ["simulate"], "--on", elsewhere) if on else None
     if of is not None and test is None and of.find("simulate") is None:
-        plant = recipes.remembered_plant(call.pipeline.make(of).content)
-        test = recipes.test_set(call.experiment, plant)
+        content = call.pipeline.make(of).content
+        test = recipes.test_set(call.experiment, recipes.remembered_simulation(content.plant, content.dt))
     call.run(recipes.evaluation(call.experiment, of, test), as_json=as_json, dry_run=dry_run)
 
 
@@ -196,4 +330,6 @@ def register(app: typer.Typer) -> None:
     app.command("sample", rich_help_panel="Make")(sample)
     app.command("simulate", rich_help_panel="Make")(simulate)
     app.command("fit-edmd", rich_help_panel="Make")(fit_edmd)
+    app.command("fit-eigen", rich_help_panel="Make")(fit_eigen)
+    app.command("baseline", rich_help_panel="Make")(baseline)
     app.command("evaluate", rich_help_panel="Make")(evaluate)

@@ -11,7 +11,7 @@ import typer
 from koopcli.checks import candidates
 from koopcli.cli.invocation import begin, print_json
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption, complete_name
-from koopcli.config.experiment import SECTIONS
+from koopcli.config.experiment import SECTIONS, flat
 from koopcli.config.settings import FigureName, ImageFormat
 from koopcli.console import show_table
 from koopcli.errors import InvalidValueError, StorageError, UnknownNameError, UsageError
@@ -19,8 +19,9 @@ from koopcli.errors import InvalidValueError, StorageError, UnknownNameError, Us
 if TYPE_CHECKING:
     from koopcli.stages.pipeline import Artefact
 
-UNREAD = (("fit-edmd", "order"), ("reproduce", "draws"), ("reproduce", "excitations"))
-READ = "it sweeps reproduce.orders with sample.draw and test.excitation"
+SWEPT = ("fit-edmd.order", "reproduce.draws", "reproduce.excitations")  # by a figure of several evaluations
+UNREAD = {"edmd": ("fit-eigen", "baseline"), "eigen": ("fit-edmd", "baseline", "reproduce")}  # sections, by method
+INSTEAD = "it sweeps reproduce.orders with sample.draw and test.excitation"
 
 
 def plot(
@@ -42,7 +43,7 @@ def plot(
 ) -> None:
     """Draw a figure from artefacts, making them when they are not named.
 
-    Example: koop plot orders -o orders.pdf
+    Example: koop plot error-map -o errors.pdf
     """
     if list_:
         _list(as_json=as_json)
@@ -55,15 +56,18 @@ def plot(
     if output is not None and (output.is_dir() or not os.access(output.parent, os.W_OK)):
         raise StorageError(f"cannot write {output}: name a file in a folder that can be written to")
     call = begin(store, experiment, set_, SECTIONS)
+    from koopcli.figures.registry import FIGURES
     from koopcli.stages import recipes
 
     if artefacts:
         evaluations = [call.named(name, ["evaluate"], f"the figure '{figure}'", ()) for name in artefacts]
     else:
-        for section, key in UNREAD:
-            if key in call.changes.get(section, {}):
-                raise UsageError(f"--set {section}.{key} changes nothing in the figure '{figure}': {READ}")
-        evaluations = recipes.order_sweep(call.experiment)
+        for name, _ in flat(call.changes):
+            if FIGURES[figure].several and name in SWEPT:
+                raise UsageError(f"--set {name} changes nothing in the figure '{figure}': {INSTEAD}")
+            if name.partition(".")[0] in UNREAD[FIGURES[figure].method]:
+                raise UsageError(f"--set {name} changes nothing in the figure '{figure}'")
+        evaluations = recipes.drawn_by_default(figure, call.experiment)
 
     def export(artefact: Artefact) -> None:
         if output is not None:
@@ -72,7 +76,7 @@ def plot(
         elif not as_json:
             call.console.note("add -o FILE.png, .svg or .pdf to write the image")
 
-    task = recipes.orders_figure(evaluations, image)
+    task = recipes.figure(figure, evaluations, image)
     call.run(task, as_json=as_json, dry_run=dry_run, extra=export)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -12,124 +13,148 @@ import typer
 
 from koopcli.cli.invocation import Invocation, begin, print_json, show_plan
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption
-from koopcli.config.experiment import SECTIONS, Experiment, load_experiment
+from koopcli.config.experiment import SECTIONS, Changes, Experiment, flat, load_experiment
 from koopcli.console import show_table
 from koopcli.errors import UsageError
 
 if TYPE_CHECKING:
-    from koopcli.stages.comparison import Table
-    from koopcli.stages.reproduction import Sweep
+    from koopcli.reproduction.report import Method, Run, Table
+    from koopcli.stages.pipeline import Artefact
 
-Method = Literal["edmd"]
-SWEPT = {
-    "fit-edmd.order": "reproduce.orders=[6,7]",
-    "sample.draw": 'reproduce.draws=["even"]',
-    "test.excitation": 'reproduce.excitations=["held"]',
-}
+MethodName = Literal["all", "edmd", "eigen"]
+NOT_HERE = ("sample.kind", "test.kind", "simulate.plant", "baseline.kind")
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One method of a reproduction with its runs, and the pictures of each with their captions."""
+
+    method: Method
+    runs: list[Run]
+    pictures: list[tuple[Artefact, str]]
 
 
 def reproduce(
-    method: Annotated[Method, typer.Argument(metavar="edmd", help="edmd: the paper's first method.")] = "edmd",
-    smoke: Annotated[bool, typer.Option("--smoke", help="A reduced grid, in seconds (experiment 'smoke').")] = False,
+    method: Annotated[
+        MethodName,
+        typer.Argument(
+            metavar="all|edmd|eigen", help="edmd: polynomial bases; eigen: eigenfunctions from data; all: both."
+        ),
+    ] = "all",
+    smoke: Annotated[bool, typer.Option("--smoke", help="Reduced datasets, in seconds (experiment 'smoke').")] = False,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
     dry_run: DryRunOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Reproduce the paper at full size: every order, training draw and kind of test inputs, beside its figures.
+    """Reproduce the paper at full size, beside its figures: every order of EDMD, every reading of eigenfunctions.
 
-    What --set changes is shown beside the unmodified run. The tables, the figure and the names of all artefacts
+    What --set changes is shown beside the unmodified run. The tables, the figures and the names of all artefacts
     are written to a file, whose path is printed. All of it is pinned, with what it was made from.
 
-    Example: koop reproduce edmd --set vehicle.Jzz=1731
+    Example: koop reproduce eigen --set vehicle.mu_scale=0.8
     """
     if smoke and experiment != "paper":
         raise UsageError("--smoke is an experiment of its own: leave out --experiment")
     base = "smoke" if smoke else experiment
     call = begin(store, base, set_, SECTIONS)
-    changes = [f"{section}.{key}" for section, values in call.changes.items() for key in values]
-    for name in changes:
-        if name in SWEPT:
-            raise UsageError(f"reproduce sweeps {name}: choose what it sweeps with --set '{SWEPT[name]}'")
-    from koopcli.stages import reproduction
+    from koopcli.reproduction import report
+    from koopcli.reproduction.registry import METHODS
 
-    runs = _runs(call, base)
+    chosen = list(METHODS.values()) if method == "all" else [METHODS[method]]
+    _refuse(call.changes, chosen)
+    runs = {one.name: _experiments(call, base, one) for one in chosen}
     if dry_run:
-        tasks = [task for _, one in runs for _, task in reproduction.sweep_tasks(one)]
+        tasks = [task for one in chosen for _, there in runs[one.name] for _, task in one.cells(there)]
         steps = {step.task: step for task in tasks for step in call.pipeline.plan(task)}
         show_plan(list(steps.values()), as_json=as_json)
         return
-    for _, one in runs:
-        for _, task in reproduction.sweep_tasks(one):
-            call.pipeline.check(task)
-    sweeps = [(label, reproduction.run_sweep(one, call.pipeline, f"reproduce, {label}")) for label, one in runs]
-    _finish(call, sweeps, as_json=as_json)
+    for one in chosen:
+        for _, there in runs[one.name]:
+            for _, task in one.cells(there):
+                call.pipeline.check(task)
+    parts = []
+    for one in chosen:
+        done = [report.run_cells(one, there, call.pipeline, label) for label, there in runs[one.name]]
+        drawn = [(call.pipeline.make(p.task), p.caption) for run in done for p in one.pictures(run, "png")]
+        parts.append(_Part(one, done, drawn))
+    _finish(call, method, parts, as_json=as_json)
 
 
-def _runs(call: Invocation, base: str) -> list[tuple[str, Experiment]]:
+def _refuse(changes: Changes, chosen: Sequence[Method]) -> None:
+    """Refuse what the experiments fix, sweep over or have no use for."""
+    for name, _ in flat(changes):
+        if name in NOT_HERE:
+            raise UsageError(f"reproduce has its own {name}: change it in the stages' own commands")
+        for method in chosen:
+            if name in method.fixed:
+                raise UsageError(f"reproduce sweeps {name}: choose what it sweeps with --set '{method.fixed[name]}'")
+        if not any(method.uses(name) for method in chosen):
+            raise UsageError(f"--set {name} changes nothing in reproduce {' or '.join(one.name for one in chosen)}")
+        section, _, key = name.partition(".")
+        if len(chosen) > 1 and section in ("sample", "test") and "." not in key:
+            kinds = "grid.{0} or sample.ellipsoid.{0}" if section == "sample" else "box.{0} or test.ball.{0}"
+            raise UsageError(f"--set {name}: say which, {section}.{kinds.format(key)}")
+
+
+def _experiments(call: Invocation, base: str, method: Method) -> list[tuple[str, Experiment]]:
     """The unmodified experiment, and the modified one beside it; a change of the sweep itself applies to both."""
     plan = {section: values for section, values in call.changes.items() if section == "reproduce"}
     changed = [
-        f"{section}.{key}={value}"
-        for section, values in call.changes.items()
-        if section != "reproduce"
-        for key, value in values.items()
+        f"{name}={value}"
+        for name, value in flat(call.changes)
+        if not name.startswith("reproduce.") and method.uses(name)
     ]
     runs = [("here", load_experiment(base, plan))]
     return [*runs, (" ".join(changed), call.experiment)] if changed else runs
 
 
-def _finish(call: Invocation, sweeps: list[tuple[str, Sweep]], *, as_json: bool) -> None:
+def _finish(call: Invocation, name: str, parts: Sequence[_Part], *, as_json: bool) -> None:
     """Tables on stderr, the same with all details in a file, its path on stdout."""
-    from koopcli.stages import comparison, reproduction
     from koopcli.store.pins import pin
 
-    figures = [reproduction.sweep_figure(sweep.experiment, call.pipeline) for _, sweep in sweeps]
-    tables = [comparison.paper_table(sweeps), *comparison.order_tables(sweeps)]
-    for table in tables:
-        show_table(table.header, table.rows, title=table.title, file=sys.stderr)
-    for note in comparison.notes(sweeps):
-        call.console.note(note)
-    label = f"reproduce-edmd-{_identity(sweeps)}"
-    made = [scored.record for _, sweep in sweeps for scored in sweep.scored]
-    made += [figure.record for figure in figures]
+    for part in parts:
+        for table in part.method.tables(part.runs):
+            show_table(table.header, table.rows, title=table.title, file=sys.stderr)
+        for note in part.method.notes(part.runs):
+            call.console.note(note)
+    label = f"reproduce-{name}-{_identity(parts)}"
+    made = [scored.record for part in parts for run in part.runs for scored in run.scored]
+    made += [drawn.record for part in parts for drawn, _ in part.pictures]
     pin(call.pipeline.store, label, call.pipeline.with_inputs(made))
     call.console.note(f"pinned as {label}")
-    path = _write_report(
-        call, sweeps, [*tables, comparison.full_table(sweeps)], [figure.content.image for figure in figures]
-    )
+    path = _write_report(call, name, parts)
     if as_json:
-        print_json(
-            {
-                "name": path.stem,
-                "path": str(path),
-                "runs": [_run_json(label, sweep) for label, sweep in sweeps],
-            }
-        )
+        runs = [_run_json(part.method, run) for part in parts for run in part.runs]
+        print_json({"name": path.stem, "path": str(path), "runs": runs})
     else:
         print(path)
 
 
-def _identity(sweeps: Sequence[tuple[str, Sweep]]) -> str:
-    names = "\n".join(scored.record.name for _, sweep in sweeps for scored in sweep.scored)
+def _identity(parts: Sequence[_Part]) -> str:
+    names = "\n".join(scored.record.name for part in parts for run in part.runs for scored in run.scored)
     return hashlib.sha256(names.encode()).hexdigest()[:12]
 
 
-def _write_report(call: Invocation, sweeps: list[tuple[str, Sweep]], tables: list[Table], images: list[bytes]) -> Path:
-    from koopcli.stages.comparison import notes
+def _write_report(call: Invocation, name: str, parts: Sequence[_Part]) -> Path:
+    from koopcli.reproduction.report import full_table
     from koopcli.store.files import publish, storage_errors
 
     root = call.pipeline.store.root
-    path = root / "reports" / f"edmd-{_identity(sweeps)}.md"
-    lines = ["# EDMD: paper versus here", ""]
-    for table in tables:
-        lines += [f"## {table.title}", "", *_markdown(table), ""]
-    lines += ["## What it means", "", *(f"* {note}" for note in notes(sweeps)), ""]
-    pictures = [path.with_name(f"{path.stem}-{i}.png") for i in range(len(images))]
-    for (label, _), picture in zip(sweeps, pictures, strict=True):
-        lines += [f"![RMSE against order, {label}]({picture.name})", "", f"RMSE against order: {label}", ""]
-    content = {path: "\n".join(lines).encode(), **dict(zip(pictures, images, strict=True))}
+    path = root / "reports" / f"{name}-{_identity(parts)}.md"
+    lines: list[str] = []
+    content: dict[Path, bytes] = {}
+    for part in parts:
+        lines += [f"# Paper versus here: {part.method.title}", ""]
+        for table in [*part.method.tables(part.runs), full_table(part.method, part.runs)]:
+            lines += [f"## {table.title}", "", *_markdown(table), ""]
+        lines += ["## What it means", "", *(f"* {note}" for note in part.method.notes(part.runs)), ""]
+        for drawn, caption in part.pictures:
+            picture = path.with_name(f"{path.stem}-{len(content)}.png")
+            content[picture] = drawn.content.image
+            lines += [f"![{caption}]({picture.name})", "", caption, ""]
+    content[path] = "\n".join(lines).encode()
     with storage_errors(root):
         for target, what in content.items():
             if not target.is_file() or target.read_bytes() != what:
@@ -142,9 +167,9 @@ def _markdown(table: Table) -> list[str]:
     return [f"| {' | '.join(row)} |" for row in rows]
 
 
-def _run_json(label: str, sweep: Sweep) -> dict[str, Any]:
-    cells = [{**vars(s.cell), "name": s.record.name, **s.figures} for s in sweep.scored]
-    return {"run": label, "evaluations": cells}
+def _run_json(method: Method, run: Run) -> dict[str, Any]:
+    cells = [{**vars(s.cell), "name": s.record.name, **s.figures} for s in run.scored]
+    return {"method": method.name, "run": run.label, "evaluations": cells}
 
 
 def register(app: typer.Typer) -> None:

@@ -3,55 +3,140 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from koopcli.checks import COMMAND_LINE, Origin, build, candidates, from_file
 from koopcli.config.data import locate
-from koopcli.config.settings import SAMPLES, BoxSample, Evaluate, FitEdmd, GridSample, Reproduce, Simulate
-from koopcli.errors import InvalidValueError, UsageError
+from koopcli.config.settings import (
+    OF_VEHICLE,
+    SAMPLES,
+    Baseline,
+    Evaluate,
+    FitEdmd,
+    FitEigen,
+    Reproduce,
+    SampleSettings,
+    Simulate,
+)
+from koopcli.errors import InvalidValueError, KoopError, UsageError
 from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
 
-SECTIONS = ("vehicle", "sample", "simulate", "fit-edmd", "test", "evaluate", "reproduce")
+SECTIONS = ("vehicle", "sample", "simulate", "fit-edmd", "fit-eigen", "baseline", "test", "evaluate", "reproduce")
+KINDS = {"sample": tuple(SAMPLES), "test": ("box", "ball")}
 DEFAULT_VEHICLE = "ctu-2020"
 
 T = TypeVar("T")
-Values = dict[str, object]
-Changes = dict[str, Values]  # section -> setting -> raw value
-Layer = tuple[Changes, Origin, Path]  # the values, where they came from, and the folder of relative paths
+Values = dict[str, Any]
+Changes = dict[str, Values]  # section -> setting -> raw value, or a table of them
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Raw values, where they came from, and the folder of relative paths in them."""
+
+    values: Mapping[str, Mapping[str, Any]]
+    origin: Origin
+    folder: Path
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """Settings of every stage: ``sample`` and ``simulate`` make the training set, ``test`` the test states."""
+    """Settings of every stage; :meth:`sample` and :meth:`test` give those that depend on a kind and on the vehicle."""
 
-    sample: GridSample | BoxSample
+    layers: tuple[Layer, ...]
     simulate: Simulate
     fit_edmd: FitEdmd
-    test: BoxSample
+    fit_eigen: FitEigen
+    baseline: Baseline
     evaluate: Evaluate
     reproduce: Reproduce
+
+    @property
+    def vehicle(self) -> VehicleParameters:
+        """The vehicle of the training set."""
+        return self.simulate.vehicle
+
+    @property
+    def vehicle_name(self) -> str:
+        """What the vehicle is called: for tables only, a recipe holds its values."""
+        named = [layer.values.get("vehicle", {}).get("name") for layer in self.layers]
+        return Path(str(next((name for name in reversed(named) if name), DEFAULT_VEHICLE))).stem
+
+    def with_vehicle(self, name: str) -> Experiment:
+        """The experiment with another vehicle, and with the parameters that the command line changes changed in it."""
+        changed = {key: v for key, v in self.layers[-1].values.get("vehicle", {}).items() if key != "name"}
+        return self._driving(change(vehicle_named(name, self.layers[0].folder), changed, COMMAND_LINE))
+
+    def with_parameters(self, **changed: object) -> Experiment:
+        """The experiment with single parameters of its vehicle replaced."""
+        return self._driving(replace(self.vehicle, **changed))  # type: ignore[arg-type]
+
+    def _driving(self, vehicle: VehicleParameters) -> Experiment:
+        return replace(self, simulate=replace(self.simulate, vehicle=vehicle))
+
+    def sample(self, kind: str) -> SampleSettings:
+        """The training sample, of ``kind`` unless the experiment names one."""
+        return self._sampled("sample", kind, self.vehicle)
+
+    def test(self, kind: str, vehicle: VehicleParameters) -> SampleSettings:
+        """The test sample of a ``vehicle``, of ``kind`` unless the experiment names one."""
+        return self._sampled("test", kind, vehicle)
+
+    def _sampled(self, section: str, kind: str, vehicle: VehicleParameters) -> SampleSettings:
+        """What applies to the kind in effect: tables of that kind, and settings written outside any table.
+
+        The latter hold for the kind that was in effect in their layer; a layer that changes the kind starts afresh.
+        """
+        before = kind
+        relevant: list[tuple[Layer, Values]] = []
+        for layer in self.layers:
+            given = layer.values.get(section, {})
+            now = given.get("kind", before)
+            if now != before:
+                relevant = []
+            before = now
+            loose = {key: v for key, v in given.items() if key != "kind" and not isinstance(v, Mapping)}
+            _check_owner(section, now, loose, layer.origin)
+            relevant.append((layer, loose))
+        layers, known = [], {f.name for f in fields(SAMPLES[before])}
+        for layer in self.layers:
+            there = layer.values.get(section, {}).get(before)
+            table = there if isinstance(there, Mapping) else {}  # grid and box samples have a setting "box" too
+            loose = next((values for one, values in relevant if one is layer), {})
+            layers.append(Layer({section: {**table, **loose}}, layer.origin, layer.folder))
+        if set(OF_VEHICLE) <= known:
+            body = {name: getattr(vehicle, name) for name in OF_VEHICLE}
+            layers = [Layer({section: body}, COMMAND_LINE, Path()), *layers]
+        return _section(SAMPLES[before], section, layers).settled()
 
 
 def load_experiment(name: str, changes: Changes) -> Experiment:
     """The experiment ``name`` (shipped, or a file by its path) with ``changes`` of the command line laid over it."""
     path = locate("experiments", name, "experiment")
     here = from_file(path)
-    layers: list[Layer] = [(_read(path, here), here, path.parent), (changes, COMMAND_LINE, Path())]
-    for values, origin, _ in layers:
-        for section in values:
+    layers = (Layer(_read(path, here), here, path.parent), Layer(changes, COMMAND_LINE, Path()))
+    for layer in layers:
+        for section in layer.values:
             if section not in SECTIONS:
-                raise origin.misnamed(origin.say(f"unknown section '{section}'{candidates(section, SECTIONS)}"))
-        if "vehicle" in values.get("simulate", {}):
-            raise origin.misnamed(origin.say("the vehicle has a section of its own: vehicle.name, vehicle.Jzz"))
-    vehicle: Layer = ({"simulate": {"vehicle": _vehicle(layers)}}, COMMAND_LINE, Path())
+                raise layer.origin.misnamed(
+                    layer.origin.say(f"unknown section '{section}'{candidates(section, SECTIONS)}")
+                )
+        if "vehicle" in layer.values.get("simulate", {}):
+            raise layer.origin.misnamed(
+                layer.origin.say("the vehicle has a section of its own: vehicle.name, vehicle.Jzz")
+            )
+        for section in KINDS:
+            _check_sampled(section, layer)
+    vehicle = Layer({"simulate": {"vehicle": _vehicle(layers)}}, COMMAND_LINE, Path())
     return Experiment(
-        sample=_sample(layers),
+        layers=layers,
         simulate=_section(Simulate, "simulate", [vehicle, *layers]),
         fit_edmd=_section(FitEdmd, "fit-edmd", layers),
-        test=_section(BoxSample, "test", layers),
+        fit_eigen=_section(FitEigen, "fit-eigen", layers),
+        baseline=_section(Baseline, "baseline", layers),
         evaluate=_section(Evaluate, "evaluate", layers),
         reproduce=_section(Reproduce, "reproduce", layers),
     )
@@ -62,13 +147,32 @@ def parse_set(assignments: Sequence[str]) -> Changes:
     changes: Changes = {}
     for text in assignments:
         name, equals, raw = text.partition("=")
-        section, dot, key = name.strip().partition(".")
-        if not (equals and dot and key):
+        section, *keys = name.strip().split(".")
+        if not (equals and keys and all(keys)):
             raise UsageError(f"--set {text}: write --set stage.key=value, such as --set vehicle.Jzz=1731")
         if section not in SECTIONS:
             raise UsageError(f"--set {text}: unknown stage '{section}'{candidates(section, SECTIONS)}")
-        changes.setdefault(section, {})[key] = _toml_value(raw)
+        table = changes.setdefault(section, {})
+        for key in keys[:-1]:
+            table = table.setdefault(key, {})
+            if not isinstance(table, dict):
+                raise UsageError(f"--set {text}: '{key}' is given a value of its own as well")
+        table[keys[-1]] = _toml_value(raw)
     return changes
+
+
+def flat(changes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Every changed setting by its full name, such as ``vehicle.lateral.mu``, with its raw value."""
+    for key, value in changes.items():
+        if isinstance(value, Mapping):
+            yield from flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def vehicle_named(name: str, folder: Path = Path()) -> VehicleParameters:
+    """The vehicle ``name`` (shipped, or a file by its path from ``folder``)."""
+    return read_vehicle(locate("vehicles", name, "vehicle", folder))
 
 
 def _toml_value(text: str) -> object:
@@ -94,38 +198,73 @@ def _read(path: Path, here: Origin) -> Changes:
 def _section(cls: type[T], section: str, layers: Sequence[Layer]) -> T:
     """The settings ``cls``; each layer is checked by itself, so that an error names where the value came from."""
     settled: Values = {}
-    for values, origin, _ in layers:
-        given = values.get(section, {})
-        parsed = build(cls, {**settled, **given}, origin, f"{section}.")
+    for layer in layers:
+        given = layer.values.get(section, {})
+        parsed = build(cls, {**settled, **given}, layer.origin, f"{section}.")
         settled |= {key: getattr(parsed, key) for key in given}
     return build(cls, settled, COMMAND_LINE, f"{section}.")
 
 
-def _sample(layers: Sequence[Layer]) -> GridSample | BoxSample:
-    """The training sample; a layer that changes the kind starts afresh."""
-    kind, relevant = "grid", list(layers)
-    for i, (values, origin, _) in enumerate(layers):
-        given = values.get("sample", {}).get("kind", kind)
-        if not isinstance(given, str) or given not in SAMPLES:
-            raise origin.misnamed(origin.say(f"unknown kind of sample {given!r}{candidates(str(given), SAMPLES)}"))
-        if given != kind:
-            kind, relevant = given, list(layers[i:])
-        for key in values.get("sample", {}):
-            owner = next((k for k, cls in SAMPLES.items() if key in {f.name for f in fields(cls)}), None)
-            if owner is not None and key not in {f.name for f in fields(SAMPLES[kind])}:
-                raise origin.misnamed(
-                    origin.say(f"'sample.{key}' belongs to kind '{owner}', this sample is of kind '{kind}'")
-                )
-        build(SAMPLES[kind], values.get("sample", {}), origin, "sample.")
-    return _section(SAMPLES[kind], "sample", relevant)
+def _check_sampled(section: str, layer: Layer) -> None:
+    """Refuse what no kind of sample would take, whichever will be in effect."""
+    where = layer.origin
+    for key, value in layer.values.get(section, {}).items():
+        misnamed = value if key == "kind" else key if isinstance(value, Mapping) else None
+        if misnamed is not None and misnamed not in KINDS[section]:
+            raise where.misnamed(
+                where.say(f"unknown kind of {section} {misnamed!r}{candidates(str(misnamed), KINDS[section])}")
+            )
+        if isinstance(value, Mapping):
+            for name in OF_VEHICLE:
+                if name in value:
+                    raise where.misnamed(where.say(f"'{section}.{key}.{name}' is the vehicle's: set vehicle.{name}"))
+            _check_owner(f"{section}.{key}", key, value, where)
+            _try_out(key, value, where, f"{section}.{key}.")
+        elif key != "kind":
+            _check_loose(section, key, value, where)
+
+
+def _check_loose(section: str, key: str, value: object, origin: Origin) -> None:
+    """Refuse a setting outside any table that none of the kinds takes."""
+    known = {kind: {f.name for f in fields(SAMPLES[kind])} - {"kind", *OF_VEHICLE} for kind in KINDS[section]}
+    if key in OF_VEHICLE:
+        raise origin.misnamed(origin.say(f"'{section}.{key}' is the vehicle's: set vehicle.{key}"))
+    owners = [kind for kind in known if key in known[kind]]
+    if not owners:
+        every = sorted(set().union(*known.values()))
+        raise origin.misnamed(origin.say(f"unknown setting '{section}.{key}'{candidates(key, every)}"))
+    refused: list[KoopError] = []
+    for kind in owners:
+        try:
+            _try_out(kind, {key: value}, origin, f"{section}.")
+        except (UsageError, InvalidValueError) as error:
+            refused.append(error)
+    if len(refused) == len(owners):
+        raise refused[0]
+
+
+def _try_out(kind: str, values: Mapping[str, Any], origin: Origin, prefix: str) -> None:
+    """Build a sample of ``kind``, a stand-in for the vehicle that is not known yet."""
+    stand_in = {f.name: 1.0 for f in fields(SAMPLES[kind]) if f.name in OF_VEHICLE}
+    build(SAMPLES[kind], {**stand_in, **values}, origin, prefix)
+
+
+def _check_owner(section: str, kind: str, given: Mapping[str, Any], origin: Origin) -> None:
+    """Refuse settings that a sample of ``kind`` does not have, saying whose they are."""
+    for key in given:
+        owners = [name for name, cls in SAMPLES.items() if key in {f.name for f in fields(cls)}]
+        if owners and kind not in owners:
+            raise origin.misnamed(
+                origin.say(f"'{section}.{key}' belongs to kind '{owners[0]}', this {section} is of kind '{kind}'")
+            )
 
 
 def _vehicle(layers: Sequence[Layer]) -> VehicleParameters:
     """The vehicle named last, with the single parameters that its own or a later layer changes."""
-    vehicle = read_vehicle(locate("vehicles", DEFAULT_VEHICLE, "vehicle"))
-    for values, origin, folder in layers:
-        given = dict(values.get("vehicle", {}))
+    vehicle = vehicle_named(DEFAULT_VEHICLE)
+    for layer in layers:
+        given = dict(layer.values.get("vehicle", {}))
         if "name" in given:
-            vehicle = read_vehicle(locate("vehicles", str(given.pop("name")), "vehicle", folder))
-        vehicle = change(vehicle, given, origin)
+            vehicle = vehicle_named(str(given.pop("name")), layer.folder)
+        vehicle = change(vehicle, given, layer.origin)
     return vehicle

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from typing import Any
@@ -13,39 +13,47 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
+from koopcli.config.settings import Series
 from koopcli.figures.drawing import Drawing, column
 from koopcli.figures.style import COLOURS, COLUMN, MARKERS, PAPER, render, style
-from koopcli.records import FloatArray
-
-INPUTS = {"none": "no input", "fresh": "fresh inputs", "held": "held inputs"}
+from koopcli.records import Array, FloatArray
 
 
 @dataclass(frozen=True)
 class OrderErrors:
     """Errors in percent by order, for one training draw and one kind of test inputs."""
 
-    draw: str
-    excitation: str
+    label: str
     order: npt.NDArray[np.int64]
     mean: FloatArray
     median: FloatArray
     maximum: FloatArray
 
-    @property
-    def label(self) -> str:
-        """What the legend calls it."""
-        return f"{self.draw}, {INPUTS.get(self.excitation, self.excitation)}"
+
+def curves(series: Sequence[Series], inputs: Mapping[str, Any]) -> list[OrderErrors]:
+    """Evaluations grouped by label, each group by rising order."""
+    groups: dict[str, list[tuple[int, dict[str, float]]]] = {}
+    for i, one in enumerate(series):
+        score = inputs[f"{i}/evaluation"].figures()["rmse"]
+        groups.setdefault(one.label, []).append((one.order or 0, score))
+    found = []
+    for label, members in groups.items():
+        ordered = sorted(members, key=lambda member: member[0])
+        order = np.array([order for order, _ in ordered])
+        statistics = (np.array([score[name] for _, score in ordered]) for name in ("mean", "median", "max"))
+        found.append(OrderErrors(label, order, *statistics))
+    return found
 
 
-def drawing(curves: Sequence[OrderErrors], image: str) -> Drawing:
+def drawing(series: Sequence[Series], inputs: Mapping[str, Any], image: str) -> Drawing:
     """The figure with its numbers."""
-    numbers: dict[str, Any] = {}
-    for curve in curves:
-        name = f"{curve.draw} {curve.excitation}"
-        numbers[f"{name}/order"] = column(curve.order.astype(float), "order", "1")
+    drawn = curves(series, inputs)
+    numbers: dict[str, Array] = {}
+    for curve in drawn:
+        numbers[f"{curve.label}/order"] = column(curve.order.astype(float), "order", "1")
         for statistic in ("mean", "median", "maximum"):
-            numbers[f"{name}/{statistic}"] = column(getattr(curve, statistic), "order", "%")
-    return Drawing("orders", image, numbers, render(draw(curves), image))
+            numbers[f"{curve.label}/{statistic}"] = column(getattr(curve, statistic), "order", "%")
+    return Drawing("orders", image, numbers, render(draw(drawn), image))
 
 
 def draw(curves: Sequence[OrderErrors]) -> Figure:

@@ -14,6 +14,8 @@ COLUMN = 3.5  # inches, one column of a two-column page
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 PAPER = "#000000"
+TRAINING = "#bbbbbb"
+SHADES = "viridis_r"  # even in lightness, dark where errors are large
 
 STYLE = {
     "font.size": 8,

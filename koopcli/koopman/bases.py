@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
+from koopcli.koopman.lifts import Lift
 from koopcli.koopman.orthonormal import OrthonormalPolynomials, orthonormal_polynomials
 from koopcli.records import Array, FloatArray, Packed
 
 
-class Basis(Protocol):
-    """What a lift has to offer."""
-
-    @property
-    def functions(self) -> int:
-        """Number of observables N."""
+class Basis(Lift, Protocol):
+    """A lift by explicit functions of the state, which EDMD can fit."""
 
     @property
     def constant(self) -> int | None:
@@ -27,14 +24,8 @@ class Basis(Protocol):
     def state_map(self) -> FloatArray:
         """C (n_x, N) with x = C ψ(x) exactly: every basis holds the states themselves."""
 
-    def lift(self, x: FloatArray) -> FloatArray:
-        """ψ(x) (n, N) of the states (n, n_x)."""
-
     def group_moments(self, x: FloatArray, weights: FloatArray) -> FloatArray:
         """Σ_j weights[j] ψ(x[s, j]) as (n, q, N), for states in groups (n, m, n_x) and weights (m, q)."""
-
-    def pack(self) -> Packed:
-        """The basis as arrays."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +67,10 @@ class TensorPolynomial:
             )
         return z
 
+    def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
+        """rows · ψ(x) as (n, R), for ``rows`` (R, N)."""
+        return self.lift(x) @ rows.T
+
     def group_moments(self, x: FloatArray, weights: FloatArray) -> FloatArray:
         """Σ_j weights[j] ψ(x[s, j]) as (n, q, N), for states in groups (n, m, n_x) and weights (m, q).
 
@@ -100,7 +95,7 @@ class TensorPolynomial:
             arrays[f"{i}/map"] = Array(np.array([axis.centre, axis.scale]), ("centre and scale",), "that of the state")
             arrays[f"{i}/alpha"] = Array(axis.alpha, ("degree",), "1")
             arrays[f"{i}/beta"] = Array(axis.beta, ("degree",), "1")
-        return Packed(arrays, {"basis": "tensor", "axes": len(self.axes)})
+        return Packed(arrays, {"kind": "tensor", "axes": len(self.axes)})
 
     @classmethod
     def unpack(cls, packed: Packed) -> TensorPolynomial:
@@ -119,6 +114,41 @@ def tensor_polynomial(nodes: Sequence[tuple[FloatArray, FloatArray]], order: int
 
 
 @dataclass(frozen=True)
+class States:
+    """ψ(x) = x: EDMD with it is dynamic mode decomposition, with inputs where there are any."""
+
+    functions: int
+
+    constant: ClassVar[None] = None
+
+    @property
+    def state_map(self) -> FloatArray:
+        """The identity."""
+        return np.eye(self.functions)
+
+    def lift(self, x: FloatArray) -> FloatArray:
+        """The states themselves."""
+        return np.asarray(x, dtype=float)
+
+    def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
+        """rows · x as (n, R), for ``rows`` (R, n_x)."""
+        return x @ rows.T
+
+    def group_moments(self, x: FloatArray, weights: FloatArray) -> FloatArray:
+        """Σ_j weights[j] x[s, j] as (n, q, n_x), for states in groups (n, m, n_x) and weights (m, q)."""
+        return np.asarray(weights.T @ x)
+
+    def pack(self) -> Packed:
+        """Nothing but the number of states."""
+        return Packed({}, {"kind": "states", "functions": self.functions})
+
+    @classmethod
+    def unpack(cls, packed: Packed) -> States:
+        """The inverse of :meth:`pack`."""
+        return cls(packed.meta["functions"])
+
+
+@dataclass(frozen=True)
 class BasisKind:
     """How a basis is made from the data's marginals and an order, counted beforehand, and restored."""
 
@@ -132,5 +162,10 @@ BASES: dict[str, BasisKind] = {
         make=tensor_polynomial,
         count=lambda order, states: (order + 1) ** states,
         unpack=TensorPolynomial.unpack,
+    ),
+    "states": BasisKind(
+        make=lambda nodes, order: States(len(nodes)),
+        count=lambda order, states: states,
+        unpack=States.unpack,
     ),
 }

@@ -9,6 +9,8 @@ import numpy as np
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.bases import BASES, Basis
+from koopcli.koopman.coverage import STATES_LIMIT, Coverage, coverage_of
+from koopcli.koopman.modes import IndexArray
 from koopcli.koopman.predictor import Predictor
 from koopcli.koopman.regression import condition_number, least_squares
 from koopcli.progress import Progress, silent
@@ -35,7 +37,7 @@ def basis_from_data(trajectories: Trajectories, kind: str, order: int) -> Basis:
     if trajectories.factors is not None:
         x = _factors(trajectories, trajectories.factors)[1]
     else:
-        x = _spread_rows(trajectories)
+        x = _spread_rows(trajectories, MARGINAL_ROWS)
     nodes = []
     for column in x.T:
         values, counts = np.unique(column, return_counts=True)
@@ -43,12 +45,16 @@ def basis_from_data(trajectories: Trajectories, kind: str, order: int) -> Basis:
     return BASES[kind].make(nodes, order)
 
 
-def _spread_rows(trajectories: Trajectories) -> FloatArray:
-    """At most ``MARGINAL_ROWS`` states, spread by multiples of the golden ratio, which no regular data can match."""
-    total = len(trajectories) * trajectories.steps
-    chosen = np.arange(total)
-    if total > MARGINAL_ROWS:
-        chosen = np.unique((np.arange(MARGINAL_ROWS) * GOLDEN % 1.0 * total).astype(np.int64))
+def _spread(total: int, limit: int) -> IndexArray:
+    """At most ``limit`` of ``total`` rows, spread by multiples of the golden ratio, which no regular data can match."""
+    if total <= limit:
+        return np.arange(total)
+    return np.unique((np.arange(limit) * GOLDEN % 1.0 * total).astype(np.intp))
+
+
+def _spread_rows(trajectories: Trajectories, limit: int) -> FloatArray:
+    """At most ``limit`` states that a step starts from."""
+    chosen = _spread(len(trajectories) * trajectories.steps, limit)
     found, start = [], 0
     for x, _, _ in trajectories.transitions(BLOCK):
         first, last = np.searchsorted(chosen, [start, start + len(x)])
@@ -75,15 +81,16 @@ def fit(trajectories: Trajectories, basis: Basis, progress: Progress = silent) -
     else:
         A, B, rank, condition = _fit_blocks(trajectories, basis, progress)
     return Predictor(
-        basis=basis,
+        observables=basis,
         A=A,
         B=B,
         C=basis.state_map,
         dt=trajectories.dt,
-        domain=_domain(trajectories),
+        coverage=coverage(trajectories),
         state_channels=trajectories.state_channels,
         input_channels=trajectories.input_channels,
         rank=rank,
+        directions=basis.functions + n_u,
         condition=condition,
         spectral_radius=float(np.abs(np.linalg.eigvals(A)).max()),
         plant=trajectories.plant,
@@ -181,8 +188,13 @@ def _factors(trajectories: Trajectories, product: tuple[int, int]) -> tuple[Floa
     return columns, x
 
 
-def _domain(trajectories: Trajectories) -> FloatArray:
-    """The smallest and the largest training state (2, n_x)."""
+def coverage(trajectories: Trajectories) -> Coverage:
+    """Where the states lie that steps start from."""
     extremes = [(x.min(axis=0), x.max(axis=0)) for x, _, _ in trajectories.transitions(BLOCK)]
     lower, upper = zip(*extremes, strict=True)
-    return np.stack([np.min(lower, axis=0), np.max(upper, axis=0)])
+    if trajectories.factors is not None:
+        x = _factors(trajectories, trajectories.factors)[1]
+        x = x[_spread(len(x), STATES_LIMIT)]
+    else:
+        x = _spread_rows(trajectories, STATES_LIMIT)
+    return coverage_of(x, np.stack([np.min(lower, axis=0), np.max(upper, axis=0)]))

@@ -4,29 +4,69 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Protocol
 
 import numpy as np
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import metrics
-from koopcli.koopman.predictor import Predictor, response
+from koopcli.koopman.coverage import Coverage
 from koopcli.records import Array, BoolArray, Channels, FloatArray, Meta, Packed, Trajectories
+
+
+class Forecaster(Protocol):
+    """What can be scored: a predictor of whichever method, or a baseline."""
+
+    @property
+    def functions(self) -> int:
+        """Dimension of the lifted state."""
+
+    @property
+    def knows_inputs(self) -> bool:
+        """Whether inputs move the prediction at all."""
+
+    @property
+    def dt(self) -> float:
+        """Sampling period in s."""
+
+    @property
+    def coverage(self) -> Coverage:
+        """Where its training states lie."""
+
+    @property
+    def state_channels(self) -> Channels:
+        """Names and units of x."""
+
+    @property
+    def input_channels(self) -> Channels:
+        """Names and units of u."""
+
+    def predict(self, x0: FloatArray, u: FloatArray) -> FloatArray:
+        """States (n, steps+1, n_x) from ``x0`` (n, n_x) under ``u`` (n, steps, n_u)."""
+
+    def step(self, x: FloatArray, u: FloatArray) -> FloatArray:
+        """One step from ``x`` (n, n_x), lifted afresh, under ``u`` (n, n_u)."""
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Scores of n trajectories: ``rmse``, ``rmse_printed``, ``rmse_relift`` (n,) in percent; ``max_error`` (n, n_x)
-    the largest error of each state; ``in_domain`` (n,) the share of true samples inside the training box;
-    ``diverged`` and ``diverged_relift`` (n,) of the two kinds of prediction; ``x0`` (n, n_x). A diverged prediction
-    keeps its row and stays out of the figures of its kind.
+    """Scores of n trajectories: ``rmse``, ``rmse_printed``, ``rmse_relift`` (n,) in percent, and ``start_error`` (n,),
+    that of the prediction at k = 0 alone; ``max_error`` (n, n_x) the largest error of each state; ``in_domain`` (n,)
+    the share of true samples inside the training box; ``distance`` (n,) of x0 to the training states in half-widths
+    of that box, ``outside`` (n,) whether x0 lies outside their convex hull; ``diverged`` and ``diverged_relift`` (n,)
+    of the two kinds of prediction; ``x0`` (n, n_x). A diverged prediction keeps its row and stays out of the figures
+    of its kind.
     """
 
     x0: FloatArray
     rmse: FloatArray
     rmse_printed: FloatArray
     rmse_relift: FloatArray
+    start_error: FloatArray
     max_error: FloatArray
     in_domain: FloatArray
+    distance: FloatArray
+    outside: BoolArray
     diverged: BoolArray
     diverged_relift: BoolArray
     steps: int
@@ -43,6 +83,7 @@ class Evaluation:
             "rmse": metrics.summary(self.rmse[valid]),
             "rmse_printed": metrics.summary(self.rmse_printed[valid]),
             "rmse_relift": metrics.summary(self.rmse_relift[~self.diverged_relift]),
+            "start_error": metrics.summary(self.start_error[valid]),
             "max_error": dict(zip(self.state_channels.names, worst, strict=True)),
             "trajectories": len(self.rmse),
             "steps": self.steps,
@@ -50,6 +91,8 @@ class Evaluation:
             "diverged_relift": int(self.diverged_relift.sum()),
             "undefined": int(np.isnan(self.rmse[valid]).sum()),
             "in_domain_share": float(self.in_domain.mean()),
+            "outside": int(self.outside.sum()),
+            "worst_in_emptiest": metrics.overlap_of_largest(self.rmse[valid], self.distance[valid]),
             "functions": self.functions,
         }
 
@@ -57,11 +100,12 @@ class Evaluation:
         """The per-trajectory table: column names with units, and rows."""
         states = list(zip(self.state_channels.names, self.state_channels.units, strict=True))
         header = [f"{name}_0 ({unit})" for name, unit in states]
-        header += ["rmse (%)", "rmse_printed (%)", "rmse_relift (%)"]
+        header += ["rmse (%)", "rmse_printed (%)", "rmse_relift (%)", "start_error (%)"]
         header += [f"max_error {name} ({unit})" for name, unit in states]
-        header += ["in_domain (1)", "diverged (1)", "diverged_relift (1)"]
-        columns = [self.x0, self.rmse, self.rmse_printed, self.rmse_relift, self.max_error, self.in_domain]
-        return header, np.column_stack([*columns, self.diverged, self.diverged_relift]).tolist()
+        header += ["in_domain (1)", "distance (half-widths)", "outside (1)", "diverged (1)", "diverged_relift (1)"]
+        columns = [self.x0, self.rmse, self.rmse_printed, self.rmse_relift, self.start_error, self.max_error]
+        columns += [self.in_domain, self.distance]
+        return header, np.column_stack([*columns, self.outside, self.diverged, self.diverged_relift]).tolist()
 
     def pack(self) -> Packed:
         """The evaluation for storage."""
@@ -72,8 +116,11 @@ class Evaluation:
             "rmse": Array(self.rmse, row, "%"),
             "rmse_printed": Array(self.rmse_printed, row, "%"),
             "rmse_relift": Array(self.rmse_relift, row, "%"),
+            "start_error": Array(self.start_error, row, "%"),
             "max_error": Array(self.max_error, per_state, units),
             "in_domain": Array(self.in_domain, row, "1"),
+            "distance": Array(self.distance, row, "1"),
+            "outside": Array(self.outside, row, "1"),
             "diverged": Array(self.diverged, row, "1"),
             "diverged_relift": Array(self.diverged_relift, row, "1"),
         }
@@ -93,16 +140,17 @@ class Evaluation:
         return cls(**{n: a.values[...] for n, a in packed.arrays.items()}, **meta, state_channels=channels)
 
 
-def evaluate(predictor: Predictor, trajectories: Trajectories, rows: slice, first: int) -> Evaluation:
+def evaluate(predictor: Forecaster, trajectories: Trajectories, rows: slice, first: int) -> Evaluation:
     """Score ``predictor`` on the trajectories ``rows``, samples k = ``first`` .. steps.
 
     Raises ``InvalidValueError`` when states, inputs or sampling period differ from the predictor's.
     """
     _check(predictor, trajectories, first)
+    domain = predictor.coverage.domain
     x = np.asarray(trajectories.x[rows])
     u = np.asarray(trajectories.u[rows])
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging prediction is a result, not an accident
-        once = response(predictor, predictor.lift(x[:, 0]), u)
+        once = predictor.predict(x[:, 0], u)
         relift = np.empty_like(once)
         relift[:, 0] = once[:, 0]
         for k in range(trajectories.steps):
@@ -113,10 +161,13 @@ def evaluate(predictor: Predictor, trajectories: Trajectories, rows: slice, firs
             rmse=metrics.rmse(once[:, scored], x[:, scored]),
             rmse_printed=metrics.rmse_printed(once[:, scored], x[:, scored]),
             rmse_relift=metrics.rmse(relift[:, scored], x[:, scored]),
+            start_error=metrics.rmse(once[:, :1], x[:, :1]),
             max_error=np.abs(once[:, scored] - x[:, scored]).max(axis=1),
-            in_domain=metrics.in_domain(x[:, scored], predictor.domain),
-            diverged=metrics.diverged(once[:, scored], predictor.domain),
-            diverged_relift=metrics.diverged(relift[:, scored], predictor.domain),
+            in_domain=metrics.in_domain(x[:, scored], domain),
+            distance=predictor.coverage.distance(x[:, 0]),
+            outside=predictor.coverage.outside(x[:, 0]),
+            diverged=metrics.diverged(once[:, scored], domain),
+            diverged_relift=metrics.diverged(relift[:, scored], domain),
             steps=trajectories.steps,
             first=first,
             functions=predictor.functions,
@@ -134,7 +185,7 @@ def join(parts: Sequence[Evaluation]) -> Evaluation:
     return replace(parts[0], **rows)  # type: ignore[arg-type]  # mypy does not pair names with types here
 
 
-def _check(predictor: Predictor, trajectories: Trajectories, first: int) -> None:
+def _check(predictor: Forecaster, trajectories: Trajectories, first: int) -> None:
     if (predictor.state_channels, predictor.input_channels) != (
         trajectories.state_channels,
         trajectories.input_channels,

@@ -38,6 +38,19 @@ def in_domain(true: FloatArray, domain: FloatArray) -> FloatArray:
     return share
 
 
+def overlap_of_largest(values: FloatArray, others: FloatArray, share: float = 0.05) -> float:
+    """Share of the rows with the largest ``values`` (n,) that are also among those with the largest ``others`` (n,).
+
+    ``share`` of all rows count as largest, one at least; not a number without any finite value.
+    """
+    finite = np.isfinite(values)
+    count = max(1, round(share * int(finite.sum())))
+    if not finite.any():
+        return float("nan")
+    largest = np.argsort(values[finite], kind="stable")[-count:]
+    return float(np.isin(largest, np.argsort(others[finite], kind="stable")[-count:]).mean())
+
+
 def summary(values: FloatArray) -> dict[str, float]:
     """Mean, standard deviation (ddof 0), median and maximum of the finite values; not a number without any."""
     finite = values[np.isfinite(values)]

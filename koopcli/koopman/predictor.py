@@ -3,36 +3,46 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.bases import BASES, Basis
+from koopcli.koopman.bases import BASES
+from koopcli.koopman.coverage import Coverage
+from koopcli.koopman.lifts import Lift
+from koopcli.koopman.modes import Modes
+from koopcli.koopman.tabulated import Nearest
 from koopcli.records import Array, Channels, FloatArray, Meta, Packed
 
 SEGMENT = 128  # steps whose responses are formed together
+PARTS = ("mode", "real and imaginary")
+TABLES = {Nearest.kind: Nearest.unpack}  # lifts that look eigenfunctions up
 
 
 @dataclass(frozen=True)
 class Predictor:
     """z⁺ = A z + B u, x̂ = C z with z = ψ(x): eqs. (4.1), (4.2) of docs/equations.md.
 
-    ``A`` (N, N), ``B`` (N, n_u), ``C`` (n_x, N); ``dt`` in s; ``domain`` (2, n_x) the smallest and largest training
-    state; ``plant`` what was identified, as JSON; ``rank`` and ``condition`` of the regression.
+    ``A`` (N, N) as a matrix or by its rates, ``B`` (N, n_u), ``C`` (n_x, N); ``dt`` in s; ``coverage``: where the
+    training states lie; ``plant`` what was identified, as JSON; ``rank`` of ``directions`` and ``condition`` of the
+    regression; ``horizon``: the steps that it may be asked for, None for any.
     """
 
-    basis: Basis
-    A: FloatArray
+    observables: Lift
+    A: FloatArray | Modes
     B: FloatArray
     C: FloatArray
     dt: float
-    domain: FloatArray
+    coverage: Coverage
     state_channels: Channels
     input_channels: Channels
     rank: int
+    directions: int
     condition: float
     spectral_radius: float
+    horizon: int | None = None
     plant: Meta = field(default_factory=dict)
 
     @property
@@ -40,17 +50,22 @@ class Predictor:
         """Dimension N of the lifted state."""
         return len(self.A)
 
+    @property
+    def knows_inputs(self) -> bool:
+        """Whether inputs move the prediction at all."""
+        return bool(self.B.any())
+
     def lift(self, x: FloatArray) -> FloatArray:
         """The lifted state z (..., N) of ``x`` (..., n_x)."""
         x = np.asarray(x, dtype=float)
         flat = x.reshape(math.prod(x.shape[:-1]), x.shape[-1])
-        return self.basis.lift(flat).reshape(*x.shape[:-1], self.functions)
+        return self.observables.lift(flat).reshape(*x.shape[:-1], self.functions)
 
     def predict(self, x0: FloatArray, u: FloatArray | None = None, steps: int | None = None) -> FloatArray:
         """The predicted states (..., steps+1, n_x), lifted once at ``x0`` (..., n_x).
 
         ``u`` (..., steps, n_u) acts from sample k to k+1; without it the input is zero for ``steps`` steps.
-        Raises ``InvalidValueError`` for shapes that do not fit.
+        Raises ``InvalidValueError`` for shapes that do not fit and for more steps than the horizon.
         """
         x0 = np.asarray(x0, dtype=float)
         if u is None:
@@ -65,31 +80,35 @@ class Predictor:
                 f"x0 {x0.shape} and u {u.shape} do not fit a predictor of {n_x} states and {n_u} inputs"
             )
         n, k = math.prod(x0.shape[:-1]), u.shape[-2]
-        x = response(self, self.lift(x0).reshape(n, self.functions), u.reshape(n, k, n_u))
+        check_horizon(k, self.horizon)
+        x = response(self, x0.reshape(n, n_x), u.reshape(n, k, n_u))
         return x.reshape(*x0.shape[:-1], k + 1, n_x)
 
     def step(self, x: FloatArray, u: FloatArray) -> FloatArray:
         """One step from the states ``x`` (n, n_x) lifted afresh, under ``u`` (n, n_u)."""
-        return self.basis.lift(x) @ (self.C @ self.A).T + u @ (self.C @ self.B).T
+        return self.observables.observe(x, self.C @ self.A) + u @ (self.C @ self.B).T
 
     def pack(self) -> Packed:
         """The predictor for storage."""
-        basis = self.basis.pack()
-        state = self.state_channels.unit_text
+        observables, state = self.observables.pack(), self.state_channels.unit_text
+        coverage = self.coverage.pack(state)
         arrays = {
-            "A": Array(self.A, ("lifted", "lifted"), "1"),
-            "B": Array(self.B, ("lifted", "input"), "1/N"),
+            **_pack_operator(self.A),
+            "B": Array(self.B, ("lifted", "input"), ", ".join(f"1/({unit})" for unit in self.input_channels.units)),
             "C": Array(self.C, ("state", "lifted"), state),
-            "domain": Array(self.domain, ("lower and upper", "state"), state),
-            **{f"basis/{name}": array for name, array in basis.arrays.items()},
+            **{f"coverage/{name}": array for name, array in coverage.arrays.items()},
+            **{f"lift/{name}": array for name, array in observables.arrays.items()},
         }
         meta = {
             "dt": self.dt,
+            "copies": self.A.copies if isinstance(self.A, Modes) else None,
             "rank": self.rank,
+            "directions": self.directions,
             "condition": self.condition if np.isfinite(self.condition) else None,
             "spectral_radius": self.spectral_radius,
+            "horizon": self.horizon,
             "plant": self.plant,
-            "basis": basis.meta,
+            "lift": observables.meta,
             "state_channels": self.state_channels.pack(),
             "input_channels": self.input_channels.pack(),
         }
@@ -99,25 +118,63 @@ class Predictor:
     def unpack(cls, packed: Packed) -> Predictor:
         """The inverse of :meth:`pack`."""
         meta, arrays = packed.meta, packed.arrays
-        parts = {name.removeprefix("basis/"): a for name, a in arrays.items() if name.startswith("basis/")}
+        A: FloatArray | Modes
+        if meta["copies"] is None:
+            A = arrays["A"].values[...]
+        else:
+            rates = arrays["rates"].values[...]
+            A = Modes(rates[:, 0] + 1j * rates[:, 1], meta["copies"], meta["dt"])
         return cls(
-            basis=BASES[meta["basis"]["basis"]].unpack(Packed(parts, meta["basis"])),
-            A=arrays["A"].values[...],
+            observables=_unpack_lift(Packed(_below("lift/", arrays), meta["lift"]), A),
+            A=A,
             B=arrays["B"].values[...],
             C=arrays["C"].values[...],
             dt=meta["dt"],
-            domain=arrays["domain"].values[...],
+            coverage=Coverage.unpack(Packed(_below("coverage/", arrays))),
             state_channels=Channels.unpack(meta["state_channels"]),
             input_channels=Channels.unpack(meta["input_channels"]),
             rank=meta["rank"],
+            directions=meta["directions"],
             condition=np.inf if meta["condition"] is None else meta["condition"],
             spectral_radius=meta["spectral_radius"],
+            horizon=meta["horizon"],
             plant=meta["plant"],
         )
 
 
-def response(predictor: Predictor, z0: FloatArray, u: FloatArray) -> FloatArray:
-    """x̂_k = C A^k z_0 + Σ_i C A^(k-1-i) B u_i (4.3) as (n, steps+1, n_x), for ``z0`` (n, N), ``u`` (n, steps, n_u).
+def check_horizon(steps: int, horizon: int | None) -> None:
+    """Raise ``InvalidValueError`` for more ``steps`` than a predictor's ``horizon``."""
+    if horizon is not None and steps > horizon:
+        raise InvalidValueError(
+            f"{steps} steps are past the window that was fitted: this predictor may be asked for {horizon} at most; "
+            "ask for fewer, or fit longer trajectories (simulate.steps) or a shorter table (fit-eigen.tabulate)"
+        )
+
+
+def _pack_operator(A: FloatArray | Modes) -> dict[str, Array]:
+    """A as a matrix, or the continuous rates of its repeated block beside their discrete eigenvalues."""
+    if not isinstance(A, Modes):
+        return {"A": Array(A, ("lifted", "lifted"), "1")}
+    rates, eigenvalues = A.rates, A.eigenvalues
+    return {
+        "rates": Array(np.column_stack([rates.real, rates.imag]), PARTS, "1/s"),
+        "eigenvalues": Array(np.column_stack([eigenvalues.real, eigenvalues.imag]), PARTS, "1"),
+    }
+
+
+def _unpack_lift(packed: Packed, A: FloatArray | Modes) -> Lift:
+    kind = packed.meta["kind"]
+    if isinstance(A, Modes):
+        return TABLES[kind](packed, A)
+    return BASES[kind].unpack(packed)
+
+
+def _below(prefix: str, arrays: Mapping[str, Array]) -> dict[str, Array]:
+    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+
+
+def response(predictor: Predictor, x0: FloatArray, u: FloatArray) -> FloatArray:
+    """x̂_k = C A^k ψ(x_0) + Σ_i C A^(k-1-i) B u_i (4.3), (n, steps+1, n_x), for ``x0`` (n, n_x), ``u`` (n, steps, n_u).
 
     Only the n_x rows of C A^k are ever formed; the lifted state is not rolled. Time goes in segments, so that memory
     grows with the steps and not with their square.
@@ -133,7 +190,7 @@ def response(predictor: Predictor, z0: FloatArray, u: FloatArray) -> FloatArray:
         for k in range(stop - start):
             observed[k] = rows
             rows = rows @ predictor.A
-        x[:, start:stop] = (z0 @ observed.reshape(-1, N).T).reshape(n, stop - start, n_x)
+        x[:, start:stop] = predictor.observables.observe(x0, observed.reshape(-1, N)).reshape(n, stop - start, n_x)
         markov[start : min(stop, steps)] = observed[: steps - start] @ predictor.B
     for first in range(0, steps, SEGMENT):  # the inputs of one segment ...
         inputs = u[:, first : first + SEGMENT]

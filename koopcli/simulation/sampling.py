@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from koopcli.errors import InvalidValueError
 from koopcli.records import FloatArray
 
 Draw = Callable[[np.random.Generator, float, int], FloatArray]
@@ -33,6 +35,56 @@ def grid(
     factors = tuple(DRAWS[draw](generator, half_width, count) for half_width in box)
     u = np.concatenate([generator.uniform(-level, level, (columns, inputs)) for level in levels])
     return factors, u[:, np.newaxis]
+
+
+def sphere_mesh(count: int) -> FloatArray:
+    """``count`` = n² points (count, 3) of the unit sphere on n latitudes × n longitudes, poles on the last axis.
+
+    Each pole comes n times and the meridian where longitudes meet twice, as mesh functions draw it.
+    """
+    n = math.isqrt(count)
+    latitude, longitude = np.linspace(-np.pi / 2, np.pi / 2, n), np.linspace(0, 2 * np.pi, n)
+    ring, height = np.cos(latitude), np.sin(latitude)
+    ring[[0, -1]] = 0.0  # repeated points are equal to the last bit
+    east, north = np.cos(longitude), np.sin(longitude)
+    east[-1], north[-1] = east[0], north[0]
+    points = np.stack([np.outer(ring, east), np.outer(ring, north), np.repeat(height, n).reshape(n, n)], axis=-1)
+    return points.reshape(-1, 3)
+
+
+def fibonacci_mesh(count: int) -> FloatArray:
+    """``count`` points (count, 3) of the unit sphere on a spiral, each with nearly the same area around it."""
+    i = np.arange(count)
+    z = 1 - (2 * i + 1) / count
+    angle = np.pi * (3 - np.sqrt(5)) * i
+    ring = np.sqrt(1 - z**2)
+    return np.stack([ring * np.cos(angle), ring * np.sin(angle), z], axis=-1)
+
+
+def check_mesh(mesh: str, count: int) -> None:
+    """Raise ``InvalidValueError`` for a ``count`` that the ``mesh`` cannot have."""
+    if mesh == "sphere" and math.isqrt(count) ** 2 != count:
+        raise InvalidValueError(
+            f"'sample.count' must be a square such as 441 = 21² for the mesh 'sphere', got {count}: "
+            "choose one, or the mesh 'fibonacci'"
+        )
+
+
+def semi_axes(energy: float, m: float, Jzz: float) -> FloatArray:
+    """Largest v_x, v_y, yaw rate (3,) of a body of mass ``m`` and yaw inertia ``Jzz`` with the kinetic ``energy``."""
+    return np.sqrt(2 * energy / np.array([m, m, Jzz]))
+
+
+MESHES: dict[str, Callable[[int], FloatArray]] = {"sphere": sphere_mesh, "fibonacci": fibonacci_mesh}
+
+
+def ball(seed: int, count: int) -> FloatArray:
+    """``count`` points (count, 3) uniform in the volume of the unit ball: directions first, then radii."""
+    generator = np.random.default_rng(seed)
+    direction = generator.standard_normal((count, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    points: FloatArray = direction * generator.random((count, 1)) ** (1 / 3)
+    return points
 
 
 def box(

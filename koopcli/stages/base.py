@@ -104,6 +104,14 @@ class Task:
 
 
 @dataclass(frozen=True)
+class Prospect:
+    """What is known of a predictor before it is made: its lifted states, and the steps it may be asked for."""
+
+    functions: int
+    horizon: int | None = None
+
+
+@dataclass(frozen=True)
 class Stage:
     """One stage. Changing what ``run`` computes means raising ``version``: it is part of every key."""
 
@@ -123,3 +131,5 @@ class Stage:
     """Refuse, before anything upstream is made, a task that cannot work."""
     estimate: Callable[[Task], Cost]
     """What making the task will cost, its inputs aside."""
+    predicts: Callable[[Task], Prospect] | None = None
+    """Of a stage that makes predictors: what a task's one will be."""

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from koopcli.checks import build
 from koopcli.config.settings import Evaluate
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.evaluation import Evaluation, evaluate, join
+from koopcli.koopman.predictor import check_horizon
 from koopcli.records import Meta, Packed
-from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
-from koopcli.stages.fit_edmd import functions
+from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task, refuse_beyond_memory
+from koopcli.stages.makers import MAKERS
 
 
 def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
     predictor, trajectories = inputs["predictor"], inputs["trajectories"]
 
+    assert settings.first is not None, "settled from the plant"
+    first = settings.first
+
     def score(rows: slice) -> Packed:
-        return evaluate(predictor, trajectories, rows, settings.first).pack()
+        return evaluate(predictor, trajectories, rows, first).pack()
 
     parts = context.chunks(len(trajectories), settings.chunk, score)
     result = join([Evaluation.unpack(part) for part in parts])
@@ -27,32 +33,54 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
     ):
         if figures[name]:
             context.warn(f"{figures[name]} of {n} {what}; they are left out of the figures")
+    if not predictor.knows_inputs and np.asarray(trajectories.u[: settings.chunk]).any():
+        context.warn("the test trajectories have inputs, of which this predictor knows nothing: B is zero")
+    if figures["outside"]:
+        context.warn(
+            f"{figures['outside']} of {n} test states lie outside the data (the convex hull of the training states); "
+            "expect little of predictions there"
+        )
     return result
 
 
 def _describe(figures: Meta) -> str:
     score = figures["rmse"]
-    return f"RMSE mean {score['mean']:.4g} %, median {score['median']:.4g} %, max {score['max']:.4g} %"
+    emptiest = 100 * figures["worst_in_emptiest"]
+    return (
+        f"RMSE mean {score['mean']:.4g} ± {score['std']:.3g} %, median {score['median']:.4g} %, "
+        f"max {score['max']:.4g} %; of the worst 5 % of states {emptiest:.0f} % lie in the emptiest 5 % of the data"
+    )
+
+
+def _prospect(task: Task) -> Prospect:
+    """What is known of the predictor beforehand."""
+    predictor = task.input("predictor")
+    predicts = MAKERS[predictor.stage].predicts
+    assert predicts is not None
+    return predicts(predictor)
 
 
 def _check(task: Task) -> None:
     steps = task.input("trajectories").settings.steps
+    check_horizon(steps, _prospect(task).horizon)
     if task.settings.first > steps:
         raise InvalidValueError(f"'evaluate.first' must be at most the {steps} steps of the test set")
     test = task.input("trajectories").find("sample")
     rows = min(task.settings.chunk, test.settings.trajectories) if test is not None else task.settings.chunk
-    refuse_beyond_memory("a chunk", 24.0 * rows * functions(task.input("predictor")), "evaluate.chunk")
+    refuse_beyond_memory("a chunk", 24.0 * rows * _prospect(task).functions, "evaluate.chunk")
 
 
 def _estimate(task: Task) -> Cost:
-    test, predictor = task.input("trajectories"), task.input("predictor")
+    test = task.input("trajectories")
     samples = test.ancestor("sample").settings.trajectories * test.settings.steps
-    return Cost(6e-9 * samples * functions(predictor), 90.0 * test.ancestor("sample").settings.trajectories)
+    return Cost(
+        6e-9 * samples * (_prospect(task).functions + 100), 130.0 * test.ancestor("sample").settings.trajectories
+    )
 
 
 STAGE = Stage(
     name="evaluate",
-    version=1,
+    version=2,
     settings=lambda values: build(Evaluate, values),
     run=_run,
     unpack=Evaluation.unpack,

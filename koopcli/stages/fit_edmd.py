@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from koopcli.checks import build
-from koopcli.config.settings import FitEdmd, GridSample, Simulate
+from koopcli.config.settings import FitEdmd, GridSample
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import edmd
 from koopcli.koopman.bases import BASES
 from koopcli.koopman.predictor import Predictor
 from koopcli.records import Meta, Trajectories
-from koopcli.stages.base import Context, Cost, Inputs, Stage, Task
+from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task
 from koopcli.store.files import size_text
 from koopcli.vehicles.plants import PLANTS
 
@@ -20,43 +20,56 @@ def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
     trajectories: Trajectories = inputs["trajectories"]
     basis = edmd.basis_from_data(trajectories, settings.basis, settings.order)
     predictor = edmd.fit(trajectories, basis, context.progress)
-    unknowns = predictor.functions + len(predictor.input_channels)
-    if predictor.rank < unknowns:
+    unmoved = 0 if predictor.B.any() else len(predictor.input_channels)
+    if predictor.rank < predictor.directions - unmoved:
         context.warn(
-            f"the data determine {predictor.rank} of {unknowns} directions (condition {predictor.condition:.1e}); "
-            "the others were set to zero: sample more states or inputs, or lower the order"
+            f"the data determine {predictor.rank} of {predictor.directions} directions (condition "
+            f"{predictor.condition:.1e}); the others were set to zero: sample more states or inputs, or lower the order"
         )
+    elif unmoved:
+        context.warn("the inputs never move in these data, so B is zero: the predictor knows nothing of inputs")
     return predictor
 
 
-def _figures(predictor: Predictor) -> Meta:
+def figures(predictor: Predictor) -> Meta:
+    """What is told of a predictor of whichever method."""
     return {
         "functions": predictor.functions,
         "rank": predictor.rank,
+        "directions": predictor.directions,
         "condition": predictor.condition,
         "spectral_radius": predictor.spectral_radius,
+        "horizon": predictor.horizon,
     }
 
 
-def functions(task: Task) -> int:
-    """Dimension of the lifted state of a fit."""
+def describe(figures: Meta) -> str:
+    """The same in a few words."""
+    return (
+        f"{figures['functions']} functions, rank {figures['rank']} of {figures['directions']}, "
+        f"condition {figures['condition']:.2g}, spectral radius {figures['spectral_radius']:.6f}"
+    )
+
+
+def _functions(task: Task) -> int:
     return BASES[task.settings.basis].count(task.settings.order, len(PLANTS[_plant(task)].states))
 
 
 def _plant(task: Task) -> str:
     simulation = task.find("simulate")
-    return simulation.settings.plant if simulation is not None else Simulate.plant
+    return simulation.settings.plant if simulation is not None else "forces"
 
 
 def _check(task: Task) -> None:
-    order, N = task.settings.order, functions(task)
+    order, N = task.settings.order, _functions(task)
     if N > FUNCTIONS_LIMIT:
         raise InvalidValueError(
             f"'fit-edmd.order' {order} needs {N:,} functions and {size_text(8.0 * N**2)} for A alone; "
             f"the limit is {FUNCTIONS_LIMIT:,} functions: lower the order"
         )
     sample = task.find("sample")
-    if sample is not None and isinstance(sample.settings, GridSample) and order >= sample.settings.count:
+    too_few = sample is not None and isinstance(sample.settings, GridSample) and order >= sample.settings.count
+    if sample is not None and too_few and task.settings.basis != "states":
         count = sample.settings.count
         raise InvalidValueError(
             f"'fit-edmd.order' {order} is too high for {count} values per state, which carry orders up to "
@@ -65,7 +78,7 @@ def _check(task: Task) -> None:
 
 
 def _estimate(task: Task) -> Cost:
-    N = functions(task)
+    N = _functions(task)
     sample, plant = task.ancestor("sample").settings, task.ancestor("simulate").settings
     samples = sample.trajectories * plant.steps
     crossed = isinstance(sample, GridSample) and plant.steps == 1
@@ -75,15 +88,13 @@ def _estimate(task: Task) -> Cost:
 
 STAGE = Stage(
     name="fit-edmd",
-    version=1,
+    version=2,
     settings=lambda values: build(FitEdmd, values),
     run=_run,
     unpack=Predictor.unpack,
-    figures=_figures,
-    describe=lambda f: (
-        f"{f['functions']} functions, rank {f['rank']}, condition {f['condition']:.2g}, "
-        f"spectral radius {f['spectral_radius']:.6f}"
-    ),
+    figures=figures,
+    describe=describe,
     check=_check,
     estimate=_estimate,
+    predicts=lambda task: Prospect(_functions(task)),
 )

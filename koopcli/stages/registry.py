@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from koopcli.stages import evaluate, fit_edmd, plot, sample, simulate
+from koopcli.stages import evaluate, plot, sample, simulate
 from koopcli.stages.base import Stage
+from koopcli.stages.makers import MAKERS
 
-STAGES: dict[str, Stage] = {module.STAGE.name: module.STAGE for module in (sample, simulate, fit_edmd, evaluate, plot)}
+STAGES: dict[str, Stage] = {
+    stage.name: stage for stage in (sample.STAGE, simulate.STAGE, *MAKERS.values(), evaluate.STAGE, plot.STAGE)
+}

@@ -1,4 +1,4 @@
-"""Stage ``sample``: initial states and inputs, the only place where anything is drawn."""
+"""Stage ``sample``: initial states and inputs, the only place where a dataset is drawn."""
 
 from __future__ import annotations
 
@@ -8,27 +8,38 @@ from typing import Any
 import numpy as np
 
 from koopcli.checks import build
-from koopcli.config.settings import SAMPLES, BoxSample, GridSample
+from koopcli.config.settings import (
+    SAMPLED_FOR,
+    SAMPLES,
+    BallSample,
+    BoxSample,
+    EllipsoidSample,
+    GridSample,
+    SampleSettings,
+)
 from koopcli.errors import InvalidValueError
-from koopcli.records import Meta, Sample
+from koopcli.records import FloatArray, Meta, Sample
 from koopcli.simulation import sampling
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
-from koopcli.vehicles.plants import PLANTS, SAMPLED_FOR
+from koopcli.vehicles.plants import PLANTS
 
 
-def _settings(values: Mapping[str, Any]) -> GridSample | BoxSample:
+def _settings(values: Mapping[str, Any]) -> SampleSettings:
     return build(SAMPLES[values["kind"]], values)
 
 
-def _run(settings: GridSample | BoxSample, inputs: Inputs, context: Context) -> Sample:
+def _run(settings: SampleSettings, inputs: Inputs, context: Context) -> Sample:
     plant, s = PLANTS[SAMPLED_FOR[settings.kind]], settings
-    n_u = len(plant.inputs)
-    factors: tuple[Any, ...] = ()
-    states = np.empty((0, len(plant.states)))
+    n_x, n_u = len(plant.states), len(plant.inputs)
+    factors: tuple[FloatArray, ...] = ()
+    states, u = np.empty((0, n_x)), np.empty((0, 1, n_u))
     if isinstance(s, GridSample):
         factors, u = sampling.grid(s.seed, s.box, s.count, s.draw, s.levels, s.columns, n_u)
-    else:
+    elif isinstance(s, BoxSample):
         states, u = sampling.box(s.seed, s.box, s.count, s.excitation, s.amplitude, s.steps, n_u)
+    else:
+        points = sampling.ball(s.seed, s.count) if isinstance(s, BallSample) else sampling.MESHES[s.mesh](s.count)
+        states, u = points * sampling.semi_axes(s.energy, s.m, s.Jzz), np.zeros((s.count, 1, n_u))
     return Sample(factors, states, u, bool(factors), plant.states, plant.inputs)
 
 
@@ -38,21 +49,17 @@ def _figures(sample: Sample) -> Meta:
 
 
 def _check(task: Task) -> None:
-    names = PLANTS[SAMPLED_FOR[task.settings.kind]].states.names
-    if len(task.settings.box) != len(names):
-        raise InvalidValueError(
-            f"'sample.box' must have one half-width for each of {', '.join(names)}, got {task.settings.box}"
-        )
+    s = task.settings
+    names = PLANTS[SAMPLED_FOR[s.kind]].states.names
+    if isinstance(s, (GridSample, BoxSample)) and len(s.box) != len(names):
+        raise InvalidValueError(f"'sample.box' must have one half-width for each of {', '.join(names)}, got {s.box}")
+    if isinstance(s, EllipsoidSample):
+        sampling.check_mesh(s.mesh, s.count)
     refuse_beyond_memory("the sample", _estimate(task).bytes, "sample.count")
 
 
 def _estimate(task: Task) -> Cost:
-    s = task.settings
-    if isinstance(s, GridSample):
-        numbers = s.count * len(s.box) + 4 * len(s.levels) * s.columns
-    else:
-        numbers = s.count * (len(s.box) + 4 * (s.steps if s.excitation == "fresh" else 1))
-    return Cost(2e-8 * numbers, 8.0 * numbers)
+    return Cost(2e-8 * task.settings.numbers, 8.0 * task.settings.numbers)
 
 
 STAGE = Stage(

@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
+from typing import Any
 
 from koopcli.checks import Origin, build, candidates, from_file, setting
 from koopcli.errors import InvalidValueError
 
 
 @dataclass(frozen=True)
+class MagicFormula:
+    """Pacejka's coefficients of one tyre in one direction (6.1)."""
+
+    B: float = setting(above=0, high=1e6, unit="1", help="stiffness factor")
+    C: float = setting(above=0, high=10, unit="1", help="shape factor")
+    mu: float = setting(low=0, high=1e3, unit="1", help="peak force over load")
+    E: float = setting(low=-1e3, high=1, unit="1", help="curvature factor")
+
+
+@dataclass(frozen=True)
 class VehicleParameters:
-    """Rigid-body and drag parameters of a single-track vehicle, SI units."""
+    """A single-track vehicle, SI units: the body with its drag, and where they are known its wheels and tyres."""
 
     m: float = setting(above=0, unit="kg", help="mass")
     Jzz: float = setting(above=0, unit="kg m^2", help="yaw inertia about the centre of gravity")
@@ -22,6 +33,15 @@ class VehicleParameters:
     c_w: float = setting(low=0, unit="1", help="drag coefficient")
     A: float = setting(low=0, unit="m^2", help="frontal area")
     rho: float = setting(low=0, unit="kg/m^3", help="air density")
+    J_R: float | None = setting(None, above=0, unit="kg m^2", help="inertia of one wheel about its axis")
+    r_w: float | None = setting(None, above=0, unit="m", help="rolling radius of a wheel")
+    mu_scale: float = setting(1.0, low=0, high=100, unit="1", help="grip of the road: factor on every tyre force")
+    lateral: MagicFormula | None = setting(None, help="tyre forces from slip angles")
+    longitudinal: MagicFormula | None = setting(None, help="tyre forces from slip ratios")
+
+
+TYRES = tuple(f.name for f in fields(VehicleParameters) if "MagicFormula" in str(f.type))  # tables of their own
+IN_PARAMETERS = {f.name: f.metadata["unit"] for f in fields(VehicleParameters) if f.name not in TYRES}
 
 
 def read_vehicle(path: Path) -> VehicleParameters:
@@ -38,30 +58,51 @@ def read_vehicle(path: Path) -> VehicleParameters:
     except (OSError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InvalidValueError(here.say(f"cannot read the vehicle file: {reason}")) from error
+    known = ("title", "source", "parameters", *TYRES)
     for key in content:
-        if key not in ("title", "source", "parameters"):
-            raise InvalidValueError(here.say(f"unknown key '{key}' (known: title, source, parameters)"))
-    table = content.get("parameters")
-    if not isinstance(table, dict):
+        if key not in known:
+            raise InvalidValueError(here.say(f"unknown key '{key}' (known: {', '.join(known)})"))
+    if "parameters" not in content:
         raise InvalidValueError(here.say("missing table '[parameters]'"))
-    file_values = {key: _si_value(key, entry, here) for key, entry in table.items()}
-    return build(VehicleParameters, file_values, here, "parameters.")
+    values = _table(content["parameters"], "parameters", IN_PARAMETERS, here)
+    vehicle = build(VehicleParameters, values, here, "parameters.")
+    units = {f.name: f.metadata["unit"] for f in fields(MagicFormula)}
+    tyres: dict[str, object] = {
+        name: build(MagicFormula, _table(content[name], name, units, here), here, f"{name}.")
+        for name in TYRES
+        if name in content
+    }
+    return build(VehicleParameters, {**vars(vehicle), **tyres}, here)
 
 
 def change(vehicle: VehicleParameters, changes: Mapping[str, object], origin: Origin) -> VehicleParameters:
-    """The vehicle with single parameters replaced; errors name the ``origin`` of the changes."""
-    return build(VehicleParameters, {**vars(vehicle), **changes}, origin, "vehicle.")
+    """The vehicle with single parameters replaced, those of a tyre in a table of their own.
+
+    Errors name the ``origin`` of the changes.
+    """
+    merged: dict[str, object] = dict(vars(vehicle))
+    for key, value in changes.items():
+        there: Any = merged.get(key)
+        nested = is_dataclass(there) and isinstance(value, Mapping)
+        merged[key] = {**vars(there), **value} if nested else value  # type: ignore[dict-item]
+    return build(VehicleParameters, merged, origin, "vehicle.")
 
 
-def _si_value(key: str, entry: object, here: Origin) -> object:
-    units = {f.name: f.metadata["unit"] for f in fields(VehicleParameters)}
+def _table(table: object, name: str, units: Mapping[str, str], here: Origin) -> dict[str, object]:
+    """The plain values of a table whose entries are each a value with its SI unit."""
+    if not isinstance(table, dict):
+        raise InvalidValueError(here.say(f"'{name}' must be a table '[{name}]'"))
+    return {key: _si_value(key, entry, name, units, here) for key, entry in table.items()}
+
+
+def _si_value(key: str, entry: object, table: str, units: Mapping[str, str], here: Origin) -> object:
     if key not in units:
-        raise InvalidValueError(here.say(f"unknown key 'parameters.{key}'{candidates(key, units)}"))
+        raise InvalidValueError(here.say(f"unknown key '{table}.{key}'{candidates(key, units)}"))
     if not isinstance(entry, dict) or set(entry) != {"value", "unit"}:
         wanted = f'{key} = {{ value = …, unit = "{units[key]}" }}'
-        raise InvalidValueError(here.say(f"'parameters.{key}' must be written as {wanted}, got {entry!r}"))
+        raise InvalidValueError(here.say(f"'{table}.{key}' must be written as {wanted}, got {entry!r}"))
     if entry["unit"] != units[key]:
         raise InvalidValueError(
-            here.say(f"'parameters.{key}' must be given in {units[key]!r}, got unit {entry['unit']!r}")
+            here.say(f"'{table}.{key}' must be given in {units[key]!r}, got unit {entry['unit']!r}")
         )
     return entry["value"]

@@ -1,15 +1,22 @@
-"""The plants by name. A new plant is one class with ``states``, ``inputs`` and ``rhs``, and one line here."""
+"""The plants by name. A new plant is one class that does what ``Plant`` says, and one line here."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Mapping
+from typing import Any, Protocol
 
+from koopcli.checks import build
 from koopcli.records import Channels, FloatArray
-from koopcli.vehicles.single_track import ForceInput
+from koopcli.vehicles.parameters import VehicleParameters
+from koopcli.vehicles.single_track import ForceInput, SlipInput
 
 
 class Plant(Protocol):
     """A continuous-time system dx/dt = rhs(x, u), vectorised over leading axes."""
+
+    @property
+    def parameters(self) -> VehicleParameters:
+        """The vehicle."""
 
     @property
     def states(self) -> Channels:
@@ -22,11 +29,25 @@ class Plant(Protocol):
     def rhs(self, x: FloatArray, u: FloatArray) -> FloatArray:
         """dx/dt (..., n_x) at ``x`` (..., n_x) under ``u`` (..., n_u)."""
 
+    def fastest_rate(self, x: FloatArray, u: FloatArray, dt: float) -> FloatArray | None:
+        """The rate in 1/s (...,) that integration over the next ``dt`` s has to resolve, None where there is none."""
 
-PLANTS: dict[str, type[ForceInput]] = {
+    def kinetic_energy(self, x: FloatArray) -> FloatArray:
+        """Kinetic energy in J (...,) of the states ``x`` (..., n_x)."""
+
+
+PLANTS: dict[str, type[ForceInput] | type[SlipInput]] = {
     "forces": ForceInput,
+    "slips": SlipInput,
 }
 
-SAMPLED_FOR = {"grid": "forces", "box": "forces"}  # the plant whose states and inputs a kind of sample draws
 
-WHEELS_PER_FORCE = {"axle": 1, "wheel": 2}
+def make_plant(name: str, vehicle: VehicleParameters, force_per: str, v_eps: float) -> Plant:
+    """The plant ``name`` of a vehicle, with those of the options that it has."""
+    return PLANTS[name].configured(vehicle, force_per=force_per, v_eps=v_eps)
+
+
+def remembered_plant(about: Mapping[str, Any]) -> Plant:
+    """The plant that trajectories or a predictor carry along as JSON."""
+    vehicle = build(VehicleParameters, about["vehicle"])
+    return make_plant(about["plant"], vehicle, about["force_per"], about["v_eps"])

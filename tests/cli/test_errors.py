@@ -52,7 +52,33 @@ def one_line(result, code, *parts):
         (["sample", "box", "--count", "100000000"], 3, "the sample would need"),
         (["simulate", "--set", "sample.count=2000"], 3, "the trajectories would need"),
         (["evaluate", "--vehicle", "x"], 2, "--vehicle"),
-        (["sample", "--set", "vehicle.Jzz=5"], 2, "--set vehicle.Jzz changes nothing here; this command uses sample"),
+        (["sample", "--set", "vehicle.Jzz=5"], 2, "vehicle.Jzz changes nothing here: only kinds of sample by kinetic"),
+        (["sample", "ball", "--set", "vehicle.rho=5"], 2, "vehicle.rho changes nothing here: only kinds of sample"),
+        (["fit-edmd", "--set", "vehicle.mu_scale=2"], 2, "the plant 'forces' has no use for it"),
+        (["fit-edmd", "--set", "vehicle.lateral.mu=2"], 2, "the plant 'forces' has no use for it"),
+        (["fit-eigen", "--set", "simulate.force_per=wheel"], 2, "the plant 'slips' has no use for it"),
+        (["fit-eigen", "--boundary", "optimal", "--centres", "9"], 2, "'optimal' has no use for it"),
+        (["fit-edmd", "--set", "fit-edmd.basis=states", "--order", "3"], 2, "'states' has no use for it"),
+        (["sample", "ellipsoid", "--count", "440"], 3, "must be a square such as 441 = 21²"),
+        (["sample", "ellipsoid", "--draw", "even"], 2, "'sample.draw' belongs to kind 'grid'"),
+        (["sample", "ball", "--energy", "0"], 3, "'sample.energy' must be above 0 J"),
+        (
+            ["simulate", "--plant", "slips", "--set", "sample.kind=grid"],
+            3,
+            "inputs of the plant 'forces', not of 'slips'",
+        ),
+        (["fit-eigen", "--tabulate", "0.3"], 3, "leaves nothing of trajectories of 0.3 s"),
+        (["fit-eigen", "--tabulate", "0.015"], 3, "whole number of sampling periods of 0.01 s"),
+        (["fit-eigen", "--degree", "9"], 3, "220 rates for trajectories of 30 steps"),
+        (["fit-eigen", "--cut", "2"], 3, "'fit-eigen.cut' must be at most 1"),
+        (["fit-eigen", "--set", "sample.kind=grid"], 3, "an eigenfunction e^(λt) g(x0) belongs to a system that runs"),
+        (["fit-eigen", "--set", "sample.kind=box"], 3, "drives its trajectories with inputs that change"),
+        (["baseline", "guess"], 2, "guess"),
+        (["reproduce", "--set", "sample.count=2"], 2, "say which, sample.grid.count or sample.ellipsoid.count"),
+        (["reproduce", "edmd", "--set", "vehicle.mu_scale=2"], 2, "changes nothing in reproduce edmd"),
+        (["reproduce", "eigen", "--set", "test.seed=2"], 2, "reproduce.seeds"),
+        (["reproduce", "edmd", "--set", "sample.kind=box"], 2, "reproduce has its own sample.kind"),
+        (["plot", "error-map", "--set", "fit-edmd.order=3"], 2, "changes nothing in the figure 'error-map'"),
         (["fit-edmd", "--set", "test.count=7"], 2, "--set test.count changes nothing here"),
         (["simulate", "--vehicle", "~nouser/x.toml"], 3, "~nouser/x.toml"),
         (["simulate", "--vehicle", "x" * 300 + ".toml"], 3, "File name too long"),
@@ -258,7 +284,9 @@ def test_inputs_that_never_move_are_a_warning(koop):
     done = koop("fit-edmd", "--set", "sample.columns=1", "--set", "sample.levels=[1.0]", "--json")
     assert done.code == 0
     assert json.loads(done.out)["condition"] is None
-    assert "the data determine 27 of 31 directions" in done.err
+    assert "the inputs never move in these data, so B is zero" in done.err
+    test = koop("evaluate", json.loads(done.out)["name"])
+    assert "of which this predictor knows nothing" in test.err
 
 
 def test_what_cannot_be_read_is_named(koop, folder, monkeypatch):

@@ -109,10 +109,10 @@ def test_bars_on_a_terminal_and_nothing_of_them_on_stdout(folder):
         out, _ = process.communicate(timeout=60)
     os.close(ours)
     assert process.returncode == 0
-    assert out.decode().startswith("artefacts/reports/edmd-")
+    assert out.decode().startswith("artefacts/reports/all-")
     assert out.count(b"\n") == 1
     assert b"%" in shown
-    assert b"Paper versus here" in shown
+    assert b"EDMD: paper versus here" in shown
 
 
 def test_a_closed_pipe_is_silent(folder):

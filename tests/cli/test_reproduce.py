@@ -13,7 +13,7 @@ def test_the_table_the_report_and_the_pins(koop, folder):
     text = report.read_text()
     for part in ("paper", "11.1 %", "unstated inputs", "random draw", "even draw", f"]({report.stem}-0.png)"):
         assert part in text
-    assert "Paper versus here" in done.err
+    assert "EDMD: paper versus here" in done.err
     assert "No parameter was chosen" in done.err
     assert report.with_name(f"{report.stem}-0.png").read_bytes().startswith(b"\x89PNG")
     for name in re.findall(r"evaluate/[0-9a-f]{12}", text):
@@ -26,30 +26,30 @@ def test_the_table_the_report_and_the_pins(koop, folder):
 
 
 def test_again_from_the_store_without_a_write(koop, folder):
-    first = koop("reproduce")
+    first = koop("reproduce", "edmd")
     before = {path: path.stat().st_mtime_ns for path in (folder / "artefacts").rglob("*")}
-    again = koop("reproduce")
+    again = koop("reproduce", "edmd")
     assert again.out == first.out
     assert "made in" not in again.err
     assert {path: path.stat().st_mtime_ns for path in (folder / "artefacts").rglob("*")} == before
 
 
 def test_one_changed_assumption_beside_the_unmodified_run(koop, folder):
-    plain = koop("reproduce", "--json")
-    both = json.loads(koop("reproduce", "--set", "vehicle.Jzz=1731", "--json").out)
+    plain = koop("reproduce", "edmd", "--json")
+    both = json.loads(koop("reproduce", "edmd", "--set", "vehicle.Jzz=1731", "--json").out)
     assert [run["run"] for run in both["runs"]] == ["here", "vehicle.Jzz=1731"]
     assert both["runs"][0]["evaluations"] == json.loads(plain.out)["runs"][0]["evaluations"]
     here, changed = (run["evaluations"] for run in both["runs"])
     assert len(here) == len(changed) == 8
     assert all(a["rmse"] != b["rmse"] for a, b in zip(here, changed, strict=True))
     text = (folder / both["path"]).read_text()
-    assert "RMSE against order: vehicle.Jzz=1731" in text
-    amplitude = koop("reproduce", "--set", "test.amplitude=50")
+    assert "RMSE against order, vehicle.Jzz=1731" in text
+    amplitude = koop("reproduce", "edmd", "--set", "test.amplitude=50")
     assert "±10000 or 50 N" in amplitude.err
 
 
 def test_the_figures_of_the_report_are_those_of_evaluate(koop):
-    runs = json.loads(koop("reproduce", "--json").out)["runs"]
+    runs = json.loads(koop("reproduce", "edmd", "--json").out)["runs"]
     (cell,) = [c for c in runs[0]["evaluations"] if (c["draw"], c["order"], c["excitation"]) == ("even", 2, "none")]
     alone = koop("evaluate", "--json", "--set", "sample.draw=even", "--excitation", "none", "--set", "fit-edmd.order=2")
     assert json.loads(alone.out)["rmse"] == cell["rmse"]
@@ -58,24 +58,24 @@ def test_the_figures_of_the_report_are_those_of_evaluate(koop):
 
 def test_what_is_swept_cannot_be_set(koop):
     for text in ("fit-edmd.order=3", "sample.draw=even", "test.excitation=held"):
-        done = koop("reproduce", "--set", text)
+        done = koop("reproduce", "edmd", "--set", text)
         assert done.code == 2
         assert "--set 'reproduce." in done.err
-    plan = koop("reproduce", "--set", " reproduce.orders=[1]", "--set", 'reproduce.draws=["even"]', "--json")
+    plan = koop("reproduce", "edmd", "--set", " reproduce.orders=[1]", "--set", 'reproduce.draws=["even"]', "--json")
     assert [run["run"] for run in json.loads(plan.out)["runs"]] == ["here"]
-    assert koop("reproduce", "--set", "reproduce.orders=[1, 1]").code == 3
+    assert koop("reproduce", "edmd", "--set", "reproduce.orders=[1, 1]").code == 3
 
 
 def test_an_impossible_sweep_is_refused_before_anything_is_made(koop, folder):
-    assert koop("reproduce", "--set", "sample.count=2").code == 3
-    assert koop("reproduce", "--set", "sample.kind=box").code == 3
+    assert koop("reproduce", "edmd", "--set", "sample.count=2").code == 3
+    assert koop("reproduce", "edmd", "--set", "sample.grid.count=2").code == 3
     assert not (folder / "artefacts").exists()
 
 
 def test_dry_run_and_smoke(koop, folder):
-    plan = json.loads(koop("reproduce", "--smoke", "--dry-run", "--json", tiny=False).out)
+    plan = json.loads(koop("reproduce", "edmd", "--smoke", "--dry-run", "--json", tiny=False).out)
     assert sum(step["name"].startswith("evaluate") for step in plan["steps"]) == 4 * 2 * 3
     assert sum(step["name"].startswith("sample") for step in plan["steps"]) == 2 + 3
     assert not (folder / "artefacts").exists()
-    assert koop("reproduce", "--smoke").code == 2  # with an experiment of its own
+    assert koop("reproduce", "edmd", "--smoke").code == 2  # with an experiment of its own
     assert (data_folder() / "experiments" / "smoke.toml").is_file()

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from typing import get_args, get_type_hints
 
 import pytest
@@ -9,12 +9,25 @@ import pytest
 from koopcli.config import settings
 from koopcli.config.data import data_folder
 from koopcli.config.experiment import SECTIONS, load_experiment, parse_set
-from koopcli.config.settings import BoxSample, Evaluate, FitEdmd, GridSample, Reproduce, Simulate
+from koopcli.config.settings import (
+    SAMPLES,
+    Baseline,
+    BoxSample,
+    Evaluate,
+    FitEdmd,
+    FitEigen,
+    GridSample,
+    Reproduce,
+    Simulate,
+)
 from koopcli.errors import InvalidValueError, UnknownNameError, UsageError
 from koopcli.figures.registry import FIGURES
+from koopcli.koopman.baselines import FORECASTS
 from koopcli.koopman.bases import BASES
-from koopcli.simulation.sampling import DRAWS
-from koopcli.vehicles.plants import PLANTS, WHEELS_PER_FORCE
+from koopcli.koopman.predictor import TABLES
+from koopcli.simulation.sampling import DRAWS, MESHES
+from koopcli.vehicles.plants import PLANTS
+from koopcli.vehicles.single_track import WHEELS_PER_FORCE
 
 PAPER = tomllib.loads((data_folder() / "experiments" / "paper.toml").read_text())
 
@@ -28,6 +41,13 @@ PAPER = tomllib.loads((data_folder() / "experiments" / "paper.toml").read_text()
         (settings.BasisName, BASES),
         (settings.FigureName, FIGURES),
         (settings.Kind, settings.SAMPLES),
+        (settings.Kind, settings.SAMPLED_FOR),
+        (settings.PlantName, settings.CUSTOMS),
+        (settings.PlantName, settings.UNUSED),
+        (settings.Excitation, settings.INPUTS),
+        (settings.Mesh, MESHES),
+        (settings.LiftName, TABLES),
+        (settings.BaselineKind, FORECASTS),
     ],
 )
 def test_option_names_are_the_registries(literal, registry):
@@ -37,34 +57,89 @@ def test_option_names_are_the_registries(literal, registry):
 def test_the_paper_file_writes_out_every_default():
     """`paper.toml` and the defaults in the code are one thing said twice; neither may drift."""
     loaded = load_experiment("paper", {})
-    assert loaded.sample == GridSample()
-    assert loaded.test == BoxSample()
+    vehicle = loaded.vehicle
+    assert loaded.sample("grid") == GridSample()
+    assert loaded.test("box", vehicle) == BoxSample()
+    body = {"m": vehicle.m, "Jzz": vehicle.Jzz}
+    assert loaded.sample("ellipsoid") == SAMPLES["ellipsoid"](**body)
+    assert loaded.test("ball", vehicle) == SAMPLES["ball"](**body)
     assert loaded.fit_edmd == FitEdmd()
+    assert loaded.fit_eigen == FitEigen()
     assert loaded.evaluate == Evaluate()
     assert loaded.reproduce == Reproduce()
     assert loaded.simulate == Simulate(vehicle=loaded.simulate.vehicle)
-    for section, cls in {"sample": GridSample, "test": BoxSample, "fit-edmd": FitEdmd, "evaluate": Evaluate}.items():
-        assert set(PAPER[section]) == {f.name for f in fields(cls)}
-    assert set(PAPER) == set(SECTIONS)
+    for section, kind in (("sample", "grid"), ("sample", "ellipsoid"), ("test", "box"), ("test", "ball")):
+        assert set(PAPER[section][kind]) == {f.name for f in fields(SAMPLES[kind])} - {"kind", "m", "Jzz"}
+    for section, cls in {"fit-edmd": FitEdmd, "fit-eigen": FitEigen, "evaluate": Evaluate}.items():
+        assert set(PAPER[section]) == {f.name for f in fields(cls) if f.default is not None}
+    assert set(PAPER) == set(SECTIONS) - {"baseline"}
 
 
 def test_every_setting_has_a_help_text():
-    for cls in (GridSample, BoxSample, FitEdmd, Evaluate, Simulate, Reproduce):
+    for cls in (*SAMPLES.values(), FitEdmd, FitEigen, Baseline, Evaluate, Simulate, Reproduce):
         hints = get_type_hints(cls)
         for f in fields(cls):
-            if f.name not in ("kind", "vehicle"):
+            if f.name not in ("kind", "vehicle", "m", "Jzz"):
                 assert f.metadata["help"], (cls.__name__, f.name, hints[f.name])
 
 
 def test_the_command_line_is_laid_over_the_file():
     changed = load_experiment("smoke", parse_set(["vehicle.Jzz=1731", "sample.seed=3", "fit-edmd.order=2"]))
     assert changed.simulate.vehicle.Jzz == 1731.0
-    assert (changed.sample.seed, changed.sample.count) == (3, 7)  # the count is the smoke file's
+    sample = changed.sample("grid")
+    assert (sample.seed, sample.count) == (3, 7)  # the count is the smoke file's
     assert changed.fit_edmd.order == 2
 
 
 def test_a_change_of_kind_starts_afresh():
-    assert load_experiment("paper", parse_set(["sample.kind=box"])).sample == BoxSample()
+    assert load_experiment("paper", parse_set(["sample.kind=box"])).sample("grid") == BoxSample()
+    changed = load_experiment("paper", parse_set(["sample.kind=box", "sample.count=9"])).sample("ellipsoid")
+    assert changed == BoxSample(count=9)
+
+
+def test_a_setting_without_a_table_holds_for_the_kind_in_use(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("[sample]\ncount = 16\n[sample.grid]\nseed = 5\n")
+    mine = load_experiment(str(path), {})
+    assert (mine.sample("grid").count, mine.sample("grid").seed) == (16, 5)
+    assert mine.sample("ellipsoid").count == 16
+    assert load_experiment(str(path), parse_set(["sample.count=9"])).sample("grid").count == 9
+    assert load_experiment(str(path), parse_set(["sample.grid.count=9"])).sample("grid").count == 9
+
+
+def test_a_sample_by_energy_follows_the_vehicle():
+    changed = load_experiment("paper", parse_set(["vehicle.m=1000"]))
+    assert changed.sample("ellipsoid").m == 1000.0
+    other = load_experiment("paper", {}).vehicle
+    assert changed.test("ball", other).m == other.m  # of the vehicle that is tested
+    with pytest.raises(UsageError, match=r"'sample.m' is the vehicle's: set vehicle.m"):
+        load_experiment("paper", parse_set(["sample.m=1000"]))
+
+
+def test_single_coefficients_of_a_tyre():
+    changed = load_experiment("paper", parse_set(["vehicle.lateral.mu=0.9", "vehicle.mu_scale=2"])).vehicle
+    assert (changed.lateral.mu, changed.lateral.B, changed.mu_scale) == (0.9, 8.11, 2.0)
+    with pytest.raises(UsageError, match=r"unknown setting 'vehicle.lateral.mo'"):
+        load_experiment("paper", parse_set(["vehicle.lateral.mo=0.9"]))
+
+
+def test_another_vehicle_keeps_what_the_command_line_changes():
+    changed = load_experiment("paper", parse_set(["vehicle.Jzz=1731", "vehicle.name=ctu-2020"]))
+    assert changed.vehicle_name == "ctu-2020"
+    beside = changed.with_vehicle("rimac-2018").vehicle
+    assert (beside.Jzz, beside.lateral.mu) == (1731.0, 0.9689)
+
+
+def test_what_a_plant_does_not_use_is_not_in_its_key():
+    vehicle = load_experiment("paper", {}).vehicle
+    forces = Simulate(vehicle=vehicle, plant="forces")
+    slippery = Simulate(vehicle=replace(vehicle, mu_scale=0.5, lateral=None), plant="forces", v_eps=1.0)
+    assert forces.settled() == slippery.settled()
+    slips = Simulate(vehicle=vehicle, plant="slips", force_per="wheel")
+    assert slips.settled() == Simulate(vehicle=vehicle, plant="slips").settled()
+    assert slips.settled().vehicle.lateral == vehicle.lateral
+    assert FitEigen(boundary="optimal", centres=5, seed=3).settled() == FitEigen(boundary="optimal").settled()
+    assert FitEigen().settled() == FitEigen(cut=1e-14)
 
 
 def test_values_are_toml_or_plain_text():
@@ -99,13 +174,18 @@ def test_a_vehicle_beside_the_experiment_file(tmp_path):
         ("[sampel]\nseed = 1", "unknown section 'sampel'"),
         ("[sample]\nsede = 1", "unknown setting 'sample.sede'"),
         ("[sample]\ndraw = 'odd'", "'sample.draw' cannot be 'odd'"),
-        ("[sample]\nkind = 'ball'", "unknown kind of sample 'ball'"),
+        ("[sample]\nkind = 'cube'", "unknown kind of sample 'cube'"),
+        ("[sample.cube]\nseed = 1", "unknown kind of sample 'cube'"),
+        ("[sample]\ngrid = 3", "unknown setting 'sample.grid'"),
+        ("[sample.grid]\nenergy = 3.0", "'sample.grid.energy' belongs to kind 'ellipsoid'"),
+        ("[sample.ball]\ncount = 0", "'sample.ball.count' must be at least 1"),
+        ("[test.ball]\nm = 3", "'test.ball.m' is the vehicle's: set vehicle.m"),
         ("[sample]\nkind = ['grid']", "unknown kind of sample ['grid']"),
         ("[sample]\nbox = [1e13, 1.0, 1.0]", "'sample.box[0]' must be at most 1e+12"),
         ("[reproduce]\norders = [3, 3]", "'reproduce.orders' names a value twice"),
         ("[simulate.vehicle]\nm = 1.0", "the vehicle has a section of its own"),
         ("[test]\ncount = 0", "'test.count' must be at least 1"),
-        ("[test]\nkind = 'grid'", "'test.kind' cannot be 'grid'"),
+        ("[test]\nkind = 'grid'", "unknown kind of test 'grid'"),
         ("[vehicle]\nJzz = -1", "'vehicle.Jzz' must be above 0"),
         ("sample = 3", "must stand in a table"),
         ("[sample", "cannot read"),

@@ -5,13 +5,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from koopcli.config.settings import ImageFormat
+from koopcli.config.settings import ImageFormat, Series
 from koopcli.figures.orders import OrderErrors, draw, drawing
 
 
-def curve(draw="random 0", excitation="fresh"):
+def curve(label="random 0, fresh inputs"):
     order = np.arange(1, 6)
-    return OrderErrors(draw, excitation, order, 40.0 / order**2, 30.0 / order**2, 90.0 / order**2)
+    return OrderErrors(label, order, 40.0 / order**2, 30.0 / order**2, 90.0 / order**2)
+
+
+class Scored:
+    """As much of an evaluation as the figure looks at."""
+
+    def __init__(self, mean):
+        self.mean = mean
+
+    def figures(self):
+        return {"rmse": {"mean": self.mean, "median": self.mean / 2, "max": 3 * self.mean}}
+
+
+SERIES = [Series("random 0, fresh inputs", order) for order in (2, 1)]
+INPUTS = {"0/evaluation": Scored(10.0), "1/evaluation": Scored(40.0)}
 
 
 def lines(figure):
@@ -31,7 +45,7 @@ def test_one_curve_shows_mean_median_and_maximum_and_the_paper():
 
 
 def test_several_curves_are_told_apart():
-    figure = draw([curve(), curve("even 0"), curve(excitation="held")])
+    figure = draw([curve(), curve("even 0, fresh inputs"), curve("random 0, held inputs")])
     found = lines(figure)
     assert {"random 0, fresh inputs", "even 0, fresh inputs", "random 0, held inputs"} < set(found)
     assert len({line.get_color() for line in found.values()}) == 4
@@ -39,13 +53,14 @@ def test_several_curves_are_told_apart():
 
 @pytest.mark.parametrize("image", ImageFormat.__args__)
 def test_the_same_numbers_give_the_same_bytes(image):
-    assert drawing([curve()], image).image == drawing([curve()], image).image
+    assert drawing(SERIES, INPUTS, image).image == drawing(SERIES, INPUTS, image).image
 
 
 def test_the_numbers_come_along():
-    numbers = drawing([curve()], "svg").numbers
-    assert numbers["random 0 fresh/mean"].values == pytest.approx(curve().mean)
-    assert numbers["random 0 fresh/mean"].units == "%"
+    numbers = drawing(SERIES, INPUTS, "svg").numbers
+    assert numbers["random 0, fresh inputs/order"].values.tolist() == [1, 2]
+    assert numbers["random 0, fresh inputs/mean"].values.tolist() == [40.0, 10.0]
+    assert numbers["random 0, fresh inputs/mean"].units == "%"
 
 
 def test_a_changed_drawing_has_another_key(monkeypatch, tmp_path):
@@ -65,5 +80,5 @@ def test_nothing_global_is_left_behind():
     import matplotlib as mpl
 
     before = dict(mpl.rcParams)
-    drawing([curve()], "png")
+    drawing(SERIES, INPUTS, "png")
     assert dict(mpl.rcParams) == before

@@ -40,14 +40,15 @@ class Monomials:
     def lift(self, x):
         return np.stack([np.prod(x ** np.array(e), axis=1) for e in self.exponents], axis=1)
 
+    def observe(self, x, rows):
+        return self.lift(x) @ rows.T
+
     def group_moments(self, x, weights):
         z = self.lift(x.reshape(-1, x.shape[-1])).reshape(*x.shape[:2], -1)
         return np.einsum("jq,sjN->sqN", weights, z)
 
     def pack(self):
-        return Packed(
-            {"exponents": Array(np.array(self.exponents), ("function", "state"), "1")}, {"basis": "monomials"}
-        )
+        return Packed({"exponents": Array(np.array(self.exponents), ("function", "state"), "1")}, {"kind": "monomials"})
 
 
 def channels(prefix, n):
@@ -122,7 +123,7 @@ def test_blocks_and_product_agree(reduced, order):
     assert (blocks.C == product.C).all()
     assert blocks.rank == product.rank == basis.functions + 4
     assert blocks.condition == pytest.approx(product.condition, rel=0.1)
-    assert (blocks.domain == product.domain).all()
+    assert (blocks.coverage.domain == product.coverage.domain).all()
 
 
 def test_the_size_of_a_block_does_not_matter(reduced, monkeypatch):

@@ -128,7 +128,7 @@ def test_a_named_artefact_is_rebuilt_from_its_recipe_or_refused(fresh, store):
 
 def test_a_named_artefact_of_an_older_version_is_used_as_it_is(fresh, store, monkeypatch):
     made = fresh()[0].make(recipes.fit_edmd(experiment()))
-    monkeypatch.setitem(STAGES, "fit-edmd", replace(STAGES["fit-edmd"], version=2))
+    monkeypatch.setitem(STAGES, "fit-edmd", replace(STAGES["fit-edmd"], version=99))
     line, heard = fresh()
     line.make(recipes.evaluation(experiment(), line.named(made.record.name)))
     assert "fit-edmd" not in heard.made()
@@ -150,7 +150,8 @@ def test_a_predictor_stands_on_its_own(fresh, store):
     named = line.named(made.record.name)
     with pytest.raises(UnknownNameError, match="simulate stage behind"):
         named.ancestor("simulate")
-    plant = recipes.remembered_plant(line.make(named).content)
+    content = line.make(named).content
+    plant = recipes.remembered_simulation(content.plant, content.dt)
     assert (plant.vehicle.Jzz, plant.dt, plant.plant, plant.force_per) == (1731.0, 0.02, "forces", "axle")
     assert (
         line.make(recipes.evaluation(experiment(), named, recipes.test_set(experiment(), plant))).figures["steps"] == 5
@@ -227,7 +228,7 @@ def test_an_interrupted_evaluation_goes_on_where_it_stopped(fresh, monkeypatch):
 
 def test_another_process_may_have_made_it_meanwhile(fresh, monkeypatch):
     """What appears between the look and the lock is used."""
-    task = recipes.sample(experiment().sample)
+    task = recipes.sample(experiment().sample("grid"))
     line, _ = fresh()
     real = line.store.lock
 
@@ -259,7 +260,7 @@ def test_the_plan_says_what_making_does(fresh):
 
 
 def test_an_artefact_of_another_layout_is_refused_in_words(fresh, store):
-    made = fresh()[0].make(recipes.sample(experiment().sample)).record
+    made = fresh()[0].make(recipes.sample(experiment().sample("grid"))).record
     recipe = {**made.recipe, "version": 0}
     old = store.commit(recipe, {}, Packed({"x": Array(np.zeros(2), ("row",), "1")}), {})
     line, _ = fresh()
@@ -288,7 +289,7 @@ def test_records_hold_where_they_came_from(fresh):
 
 
 def test_the_key_is_in_no_way_random(fresh, tmp_path):
-    one = fresh()[0].make(recipes.sample(experiment().sample)).record
-    two = Pipeline(Store(tmp_path / "elsewhere"), Listener()).make(recipes.sample(experiment().sample)).record
+    one = fresh()[0].make(recipes.sample(experiment().sample("grid"))).record
+    two = Pipeline(Store(tmp_path / "elsewhere"), Listener()).make(recipes.sample(experiment().sample("grid"))).record
     assert (one.key, one.object, one.data) == (two.key, two.object, two.data)
     assert one.key.startswith("dff0df58c621")  # of these settings, for good: another key would orphan every store

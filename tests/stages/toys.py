@@ -12,22 +12,49 @@ from pathlib import Path
 import numpy as np
 
 from koopcli.checks import build
-from koopcli.config.settings import BoxSample, Evaluate, FitEdmd, GridSample, Plot, Series, Simulate
+from koopcli.config.settings import (
+    BallSample,
+    Baseline,
+    BoxSample,
+    EllipsoidSample,
+    Evaluate,
+    FitEdmd,
+    FitEigen,
+    GridSample,
+    Plot,
+    Series,
+    Simulate,
+)
+from koopcli.koopman.baselines import Forecast
 from koopcli.koopman.bases import TensorPolynomial
+from koopcli.koopman.coverage import Coverage
 from koopcli.koopman.evaluation import Evaluation
+from koopcli.koopman.modes import Modes
 from koopcli.koopman.orthonormal import OrthonormalPolynomials
 from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.tabulated import Nearest
 from koopcli.progress import silent
 from koopcli.records import Sample, Trajectories
 from koopcli.stages.base import Context
 from koopcli.stages.registry import STAGES
-from koopcli.vehicles.parameters import VehicleParameters
-from koopcli.vehicles.single_track import ForceInput
+from koopcli.vehicles.parameters import MagicFormula, VehicleParameters
+from koopcli.vehicles.single_track import ForceInput, SlipInput
 
 PINS = Path(__file__).parents[1] / "golden" / "stages.json"
 BEYOND = 1e12  # a condition number past this is rounding
 TOLERANCE = 1e-6  # above what BLAS threads and processors change, below what any change of a method does
-CAR = VehicleParameters(m=1200.0, Jzz=1500.0, l_f=1.2, l_r=1.5, c_w=0.3, A=2.0, rho=1.2)
+CAR = VehicleParameters(
+    m=1200.0,
+    Jzz=1500.0,
+    l_f=1.2,
+    l_r=1.5,
+    c_w=0.3,
+    A=2.0,
+    rho=1.2,
+    mu_scale=0.9,
+    lateral=MagicFormula(B=8.0, C=1.4, mu=1.1, E=-0.5),
+    longitudinal=MagicFormula(B=10.0, C=1.6, mu=1.2, E=0.3),
+)
 STATES, INPUTS = ForceInput.states, ForceInput.inputs
 
 
@@ -58,15 +85,68 @@ def _predictor(growth: float = 0.95) -> Predictor:
     basis = TensorPolynomial((axis, axis, axis))
     A = growth * np.eye(8) + 0.01 * np.cos(np.arange(64.0)).reshape(8, 8)
     B = 1e-4 * np.sin(np.arange(32.0)).reshape(8, 4)
+    return Predictor(basis, A, B, basis.state_map, 0.01, _coverage(), STATES, INPUTS, 12, 12, 1.0, 1.0)
+
+
+def _coverage() -> Coverage:
     domain = np.array([[-20.0, -20, -20], [30, 30, 30]])
-    return Predictor(basis, A, B, basis.state_map, 0.01, domain, STATES, INPUTS, 12, 1.0, 1.0)
+    box = np.hstack([np.vstack([np.eye(3), -np.eye(3)]), -np.ones((6, 1))])
+    return Coverage(_sample().x0, domain, box)
+
+
+def _gliding(steps: int = 12) -> Trajectories:
+    """Trajectories without inputs that leave their initial states for good, one of them twice."""
+    t = 0.01 * np.arange(steps + 1)
+    x0 = np.array([[20.0, 3, 1], [15, -8, 2], [-10, 12, -3], [18, 2, -4], [20, 3, 1]])
+    x = x0[:, np.newaxis] * np.exp(-np.outer(t, [1.0, 2.0, 3.0])) + 0.3 * np.sin(x0[:, np.newaxis] * t[:, np.newaxis])
+    return Trajectories(x, np.zeros((5, steps, 4)), 0.01, STATES, SlipInput.inputs)
+
+
+def _looked_up() -> Predictor:
+    """A pair of complex rates and a real one, two boundary functions, looked up at three trajectories."""
+    modes = Modes(np.array([-1 + 5j, -1 - 5j, -0.5]), 2, 0.01)
+    starts = 1 + np.sin(np.arange(18.0)).reshape(3, 2, 3)
+    C = 10 * np.cos(np.arange(18.0)).reshape(3, 6)
+    states = 3 * np.sin(np.arange(45.0) ** 2).reshape(3, 5, 3)
+    lift = Nearest(states, starts, modes)
+    return Predictor(lift, modes, np.zeros((6, 4)), C, 0.01, _coverage(), STATES, INPUTS, 5, 6, 1e3, 1.0, horizon=8)
+
+
+def _calm() -> Trajectories:
+    data = _trajectories(4)
+    return Trajectories(data.x, 0 * data.u, data.dt, STATES, INPUTS)
+
+
+def _forecast(kind: str) -> Forecast:
+    vehicle = {**vars(CAR), "lateral": vars(CAR.lateral), "longitudinal": vars(CAR.longitudinal)}
+    plant = {"plant": "slips", "force_per": "axle", "v_eps": 0.1, "vehicle": vehicle}
+    return Forecast(kind, 0.01, _coverage(), STATES, INPUTS, plant)
 
 
 def _evaluation() -> Evaluation:
     t = np.arange(10.0)
     return Evaluation(
-        np.outer(t, [1.0, 2, 3]), t, t, t, np.outer(t, [1.0, 2, 3]), t / 10, t > 8, t > 7, 5, 1, 8, STATES
+        x0=np.outer(t, [1.0, 2, 3]),
+        rmse=t,
+        rmse_printed=t,
+        rmse_relift=t,
+        start_error=t / 2,
+        max_error=np.outer(t, [1.0, 2, 3]),
+        in_domain=t / 10,
+        distance=np.sin(t),
+        outside=t > 5,
+        diverged=t > 8,
+        diverged_relift=t > 7,
+        steps=4,
+        first=1,
+        functions=8,
+        state_channels=STATES,
     )
+
+
+def _slid() -> Sample:
+    u = 0.1 * np.sin(np.arange(12.0) ** 2).reshape(3, 1, 4)
+    return Sample((), np.array([[20.0, 1, 2], [-5, 3, -8], [0.01, -2, 5]]), u, False, STATES, SlipInput.inputs)
 
 
 def _chunks(count, size, compute):
@@ -79,25 +159,52 @@ TOYS = {
         (GridSample(seed=3, count=4, columns=2, draw="even"), {}),
         (BoxSample(count=5, steps=3), {}),
         (BoxSample(count=5, excitation="held"), {}),
+        (EllipsoidSample(count=16, m=1200.0, Jzz=1500.0), {}),
+        (EllipsoidSample(count=15, mesh="fibonacci", energy=1e5, m=1200.0, Jzz=1500.0), {}),
+        (BallSample(count=5, m=1200.0, Jzz=1500.0), {}),
     ],
     "simulate": [
-        (Simulate(vehicle=CAR, steps=3), {"sample": _sample()}),
-        (Simulate(vehicle=CAR, steps=2, force_per="wheel", dt=0.02), {"sample": _sample()}),
+        (Simulate(vehicle=CAR, plant="forces", steps=3), {"sample": _sample()}),
+        (Simulate(vehicle=CAR, plant="forces", steps=2, force_per="wheel", dt=0.02), {"sample": _sample()}),
+        (Simulate(vehicle=CAR, plant="slips", steps=40), {"sample": _slid()}),
     ],
     "fit-edmd": [
         (FitEdmd(order=2), {"trajectories": _trajectories(1)}),
         (FitEdmd(order=2), {"trajectories": _trajectories(3)}),
         (FitEdmd(order=1), {"trajectories": _flat()}),
+        (FitEdmd(basis="states"), {"trajectories": _gliding()}),
+    ],
+    "fit-eigen": [
+        (FitEigen(centres=4, tabulate=0.05, cut=1e-6), {"trajectories": _gliding()}),
+        (FitEigen(centres=6, tabulate=0.05, cut=1e-6, scaling="extent", seed=3), {"trajectories": _gliding()}),
+        (FitEigen(boundary="optimal", degree=1, tabulate=0.04), {"trajectories": _gliding()}),
+    ],
+    "baseline": [
+        (Baseline(), {"trajectories": _gliding()}),
+        (Baseline(kind="linearisation"), {"trajectories": _trajectories(1)}),
     ],
     "evaluate": [
-        (Evaluate(chunk=100), {"predictor": _predictor(), "trajectories": _trajectories(4)}),
-        (Evaluate(chunk=100), {"predictor": _predictor(growth=250.0), "trajectories": _trajectories(4)}),
+        (Evaluate(chunk=100, first=1), {"predictor": _predictor(), "trajectories": _trajectories(4)}),
+        (Evaluate(chunk=100, first=1), {"predictor": _predictor(growth=250.0), "trajectories": _trajectories(4)}),
+        (Evaluate(chunk=100, first=0), {"predictor": _looked_up(), "trajectories": _calm()}),
+        *(
+            (Evaluate(chunk=100, first=0), {"predictor": _forecast(kind), "trajectories": _calm()})
+            for kind in ("hold", "rotation", "linearisation")
+        ),
     ],
     "plot": [
         (
-            build(Plot, {"figure": "orders", "format": "png", "series": (Series(3, "a", "none"),), "drawn_by": ""}),
-            {"0": _evaluation()},
-        )
+            build(Plot, {"figure": "orders", "format": "png", "series": (Series("a", 3),), "drawn_by": ""}),
+            {"0/evaluation": _evaluation()},
+        ),
+        (
+            build(Plot, {"figure": "error-map", "format": "png", "series": (Series("a", None),), "drawn_by": ""}),
+            {"0/evaluation": _evaluation(), "0/training": _gliding()},
+        ),
+        (
+            build(Plot, {"figure": "mean-trajectory", "format": "png", "series": (Series("a", None),), "drawn_by": ""}),
+            {"0/evaluation": _evaluation(), "0/predictor": _looked_up(), "0/trajectories": _calm()},
+        ),
     ],
 }
 

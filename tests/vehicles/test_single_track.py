@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from koopcli.simulation.integrate import simulate
-from koopcli.vehicles.plants import PLANTS, WHEELS_PER_FORCE
-from koopcli.vehicles.single_track import ForceInput
+from koopcli.vehicles.plants import PLANTS, make_plant
+from koopcli.vehicles.single_track import WHEELS_PER_FORCE, ForceInput
 
 MIRROR_X = np.array([1, -1, -1])  # v_y and yaw rate change sign
 MIRROR_U = np.array([1, -1, 1, -1])  # lateral forces change sign
@@ -76,8 +76,8 @@ def test_the_power_of_the_forces_is_what_the_energy_gains(plant, vehicle, states
 
 @pytest.mark.parametrize("name", PLANTS)
 def test_every_plant_keeps_the_contract(name, vehicle):
-    for wheels in WHEELS_PER_FORCE.values():
-        plant = PLANTS[name](vehicle, wheels)
+    for force_per in WHEELS_PER_FORCE:
+        plant = make_plant(name, vehicle, force_per, 0.1)
         n_x, n_u = len(plant.states), len(plant.inputs)
         assert len(plant.states.units) == n_x
         x, u = np.ones((5, 2, n_x)), np.ones((5, 2, n_u))

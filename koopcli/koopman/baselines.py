@@ -1,0 +1,104 @@
+"""Predictions that fit nothing: what any predictor has to beat (docs/equations.md 8)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from koopcli.koopman.coverage import Coverage
+from koopcli.records import Channels, FloatArray, Meta, Packed
+from koopcli.vehicles.plants import remembered_plant
+
+DIFFERENCE = 1e-5  # m/s or rad/s, of the central differences behind a Jacobian
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """``hold`` keeps the first state, ``rotation`` turns the velocity at a constant yaw rate (8.1), ``linearisation``
+    follows ẋ = f(x0) + J (x - x0) (8.2).
+
+    Scored like a predictor: ``dt`` in s, ``coverage`` of the trajectories it is set beside, ``plant`` as JSON.
+    """
+
+    kind: str
+    dt: float
+    coverage: Coverage
+    state_channels: Channels
+    input_channels: Channels
+    plant: Meta
+
+    functions = 0
+    knows_inputs = False
+
+    def predict(self, x0: FloatArray, u: FloatArray) -> FloatArray:
+        """States (n, steps+1, n_x) from ``x0`` (n, n_x); of ``u`` (n, steps, n_u) only the number of steps counts."""
+        return FORECASTS[self.kind](self, x0, u.shape[1])
+
+    def step(self, x: FloatArray, u: FloatArray) -> FloatArray:
+        """One step from ``x`` (n, n_x), whatever ``u`` (n, n_u)."""
+        return self.predict(x, u[:, np.newaxis])[:, 1]
+
+    def pack(self) -> Packed:
+        """The baseline for storage."""
+        meta = {
+            "kind": self.kind,
+            "dt": self.dt,
+            "plant": self.plant,
+            "state_channels": self.state_channels.pack(),
+            "input_channels": self.input_channels.pack(),
+        }
+        return Packed(self.coverage.pack(self.state_channels.unit_text).arrays, meta)
+
+    @classmethod
+    def unpack(cls, packed: Packed) -> Forecast:
+        """The inverse of :meth:`pack`."""
+        meta = packed.meta
+        return cls(
+            meta["kind"],
+            meta["dt"],
+            Coverage.unpack(packed),
+            Channels.unpack(meta["state_channels"]),
+            Channels.unpack(meta["input_channels"]),
+            meta["plant"],
+        )
+
+
+def hold(about: Forecast, x0: FloatArray, steps: int) -> FloatArray:
+    """The first state, for ever."""
+    return np.repeat(x0[:, np.newaxis], steps + 1, axis=1)
+
+
+def rotation(about: Forecast, x0: FloatArray, steps: int) -> FloatArray:
+    """The velocity kept in the world and the yaw rate kept: in body axes it turns backwards (8.1)."""
+    turned = -x0[:, 2, np.newaxis] * about.dt * np.arange(steps + 1)
+    x = hold(about, x0, steps)
+    x[:, :, 0] = np.cos(turned) * x0[:, :1] - np.sin(turned) * x0[:, 1:2]
+    x[:, :, 1] = np.sin(turned) * x0[:, :1] + np.cos(turned) * x0[:, 1:2]
+    return x
+
+
+def linearisation(about: Forecast, x0: FloatArray, steps: int) -> FloatArray:
+    """The plant linearised at each x0, one exact step of dt after the other (8.2)."""
+    from scipy.linalg import expm  # noqa: PLC0415
+
+    plant = remembered_plant(about.plant)
+    n, n_x = x0.shape
+
+    def flow(x: FloatArray) -> FloatArray:
+        return plant.rhs(x, np.zeros((len(x), len(plant.inputs))))
+
+    generator = np.zeros((n, n_x + 1, n_x + 1))
+    generator[:, :n_x, n_x] = flow(x0)
+    for i in range(n_x):
+        difference = DIFFERENCE * np.eye(n_x)[i]
+        generator[:, :n_x, i] = (flow(x0 + difference) - flow(x0 - difference)) / (2 * DIFFERENCE)
+    forward = expm(generator * about.dt)
+    away = np.zeros((n, steps + 1, n_x + 1))
+    away[:, 0, n_x] = 1.0
+    for k in range(steps):
+        away[:, k + 1] = np.matmul(forward, away[:, k, :, np.newaxis])[:, :, 0]
+    return np.asarray(x0[:, np.newaxis] + away[:, :, :n_x])
+
+
+FORECASTS = {"hold": hold, "rotation": rotation, "linearisation": linearisation}

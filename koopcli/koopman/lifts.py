@@ -1,0 +1,24 @@
+"""What takes a state to the lifted state z = ψ(x)."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from koopcli.records import FloatArray, Packed
+
+
+class Lift(Protocol):
+    """What a predictor asks of its ψ."""
+
+    @property
+    def functions(self) -> int:
+        """Dimension N of the lifted state."""
+
+    def lift(self, x: FloatArray) -> FloatArray:
+        """ψ(x) (n, N) of the states (n, n_x)."""
+
+    def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
+        """rows · ψ(x) as (n, R), for ``rows`` (R, N), which need not form ψ(x)."""
+
+    def pack(self) -> Packed:
+        """The lift as arrays, with its kind."""

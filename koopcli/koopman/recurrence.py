@@ -1,0 +1,108 @@
+"""Whether trajectories come back to the surface they started from, which eigenfunctions from data must not do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from koopcli.errors import InvalidValueError
+from koopcli.records import FloatArray
+
+ONE_LEVEL = 1e-6  # relative spread of the energies of states that count as one level
+TOUCH = 1e-3  # of the distance between two samples: a start nearer to the path than that lies on it
+REST = 1e-12  # of the largest state: a trajectory that moves less is at rest
+
+Energy = Callable[[FloatArray], FloatArray]
+Flow = Callable[[FloatArray], FloatArray]
+
+
+class _Return(NamedTuple):
+    trajectory: int
+    sample: int
+    start: int
+
+
+def check_starts(x: FloatArray) -> int:
+    """How many initial states of ``x`` (J, samples, n_x) repeat an earlier one, whose trajectory they share.
+
+    Raises ``InvalidValueError`` where equal states go different ways: then no function of the state is there to find.
+    """
+    _, first, which = np.unique(x[:, 0], axis=0, return_index=True, return_inverse=True)
+    like = first[which.ravel()]
+    size = np.abs(x).max()
+    for j in np.flatnonzero(like != np.arange(len(x))):
+        if np.abs(x[j] - x[like[j]]).max() > 1e-9 * size:
+            raise InvalidValueError(
+                f"trajectories {like[j]} and {j} start from the same state {_text(x[j, 0])} and go different ways: "
+                "leave one out, or add the state in which they differ"
+            )
+    return int((like != np.arange(len(x))).sum())
+
+
+def check_recurrence(x: FloatArray, dt: float, energy: Energy | None = None, flow: Flow | None = None) -> None:
+    """Raise ``InvalidValueError`` where trajectories ``x`` (J, samples, n_x) come back to their initial states (7.9).
+
+    With the kinetic ``energy`` and the ``flow`` dx/dt of the plant: initial states of one energy are a closed surface
+    that every trajectory must leave at once and stay inside of. In any case no path may lead through an initial state.
+    """
+    if energy is not None and flow is not None:
+        level = energy(x[:, 0])
+        if np.ptp(level) <= ONE_LEVEL * level.max():
+            _stay_below(x, dt, energy, flow)
+    found = _passes_a_start(x)
+    if found is not None:
+        raise InvalidValueError(
+            f"trajectory {found.trajectory} comes back at {found.sample * dt:g} s to the initial state of trajectory "
+            f"{found.start}, {_text(x[found.start, 0])}: eigenfunctions need initial states that no trajectory returns "
+            "to; shorten the trajectories or choose other initial states"
+        )
+
+
+def _stay_below(x: FloatArray, dt: float, energy: Energy, flow: Flow) -> None:
+    """Refuse a trajectory that keeps its energy at the start, or has it back later."""
+    start, epsilon = x[:, 0], 1e-6
+    size = np.abs(start).max()
+    step = epsilon * size / max(float(np.abs(flow(start)).max()), 1e-300)
+    ahead, behind = energy(start + step * flow(start)), energy(start - step * flow(start))
+    level = energy(start)
+    power = (ahead - behind) / (2 * step) / level
+    held = power > -1e-9 / max(x.shape[1] * dt, 1e-300)
+    again = energy(x[:, 1:]) >= level[:, np.newaxis]
+    late = np.asarray(again.any(axis=1))
+    if held.any() or late.any():
+        j = int(np.argmax(held | late))
+        k = 0 if held[j] else int(np.argmax(again[j])) + 1
+        what = "does not leave" if k == 0 else "comes back to"
+        raise InvalidValueError(
+            f"trajectory {j} {what} the surface of equal kinetic energy it starts from, at {k * dt:g} s, from "
+            f"{_text(start[j])}: eigenfunctions need a surface that no trajectory returns to; the vehicle must lose "
+            "energy (drag, tyres), or choose other initial states"
+        )
+
+
+def _passes_a_start(x: FloatArray) -> _Return | None:
+    """The first path that leads through an initial state again, between its samples k and k + 1 with k ≥ 1."""
+    from scipy.spatial import cKDTree  # noqa: PLC0415
+
+    J, samples, n_x = x.shape
+    scale = np.abs(x).max(axis=(0, 1))
+    scale[scale == 0] = 1.0
+    starts = x[:, 0] / scale
+    path = np.concatenate([x[:, 1:], x[:, -1:]], axis=1) / scale  # the last sample is a stretch of no length
+    nearest = cKDTree(starts).query(path.reshape(-1, n_x))[1].reshape(J, samples)
+    along = path[:, 1:] - path[:, :-1]
+    length = np.linalg.norm(along, axis=2)
+    for candidate in (nearest[:, :-1], nearest[:, 1:]):  # the start nearest to either end of a stretch
+        way = starts[candidate] - path[:, :-1]
+        share = np.clip((way * along).sum(axis=2) / np.where(length > 0, length, 1.0) ** 2, 0.0, 1.0)
+        touches = np.linalg.norm(share[..., np.newaxis] * along - way, axis=2) <= np.maximum(TOUCH * length, REST)
+        if touches.any():
+            j, k = np.argwhere(touches)[0]
+            return _Return(int(j), int(k) + 1, int(candidate[j, k]))
+    return None
+
+
+def _text(x: FloatArray) -> str:
+    return f"[{', '.join(f'{value:.4g}' for value in x)}]"

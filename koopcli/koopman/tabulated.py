@@ -1,0 +1,79 @@
+"""Eigenfunctions known at the samples of trajectories, and looked up for any other state (docs/equations.md 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from koopcli.koopman.modes import IndexArray, Modes, exponentials
+from koopcli.records import Array, FloatArray, Packed
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """ψ(x) = ψ of the nearest tabulated sample, in raw SI units (7.6).
+
+    ``states`` (J, K, n_x): the samples k = 0..K-1 of J trajectories; ``starts`` (J, copies, L): the lifted states of
+    their initial states, or (J, copies, 1) where every mode starts with the same value; ``modes`` carries them on.
+    """
+
+    states: FloatArray
+    starts: FloatArray
+    modes: Modes
+
+    kind = "nearest"
+
+    @property
+    def functions(self) -> int:
+        """Dimension N of the lifted state."""
+        return len(self.modes)
+
+    def lift(self, x: FloatArray) -> FloatArray:
+        """ψ(x) (n, N) of the states (n, n_x)."""
+        j, k = self.nearest(x)
+        return self.modes.evolve(self.starts[j], k * self.modes.dt).reshape(len(x), self.functions)
+
+    def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
+        """rows · ψ(x) as (n, R), for ``rows`` (R, N); ψ itself is only formed where it is small."""
+        if self.starts.shape[2] == len(self.modes.rates):
+            return self.lift(x) @ rows.T
+        j, k = self.nearest(x)
+        L = len(self.modes.rates)
+        per_mode = rows.reshape(len(rows), self.modes.copies, L).transpose(1, 0, 2).reshape(self.modes.copies, -1)
+        used, position = np.unique(j, return_inverse=True)
+        there = (self.starts[used, :, 0] @ per_mode).reshape(len(used), len(rows), L)
+        growth = exponentials(self.modes.rates, k * self.modes.dt)
+        return np.asarray(np.matmul(there[position], growth[:, :, np.newaxis])[:, :, 0])
+
+    def nearest(self, x: FloatArray) -> tuple[IndexArray, IndexArray]:
+        """Trajectory and sample (n,) of the tabulated state nearest to each of ``x`` (n, n_x).
+
+        A state that is not finite, as a diverged prediction has, meets the first one.
+        """
+        finite = np.isfinite(x).all(axis=1)
+        found = np.zeros(len(x), dtype=np.intp)
+        found[finite] = self._tree.query(x[finite])[1]
+        j, k = np.divmod(found, self.states.shape[1])
+        return j, k
+
+    def pack(self) -> Packed:
+        """The table."""
+        arrays = {
+            "states": Array(self.states, ("trajectory", "sample", "state"), "those of the state"),
+            "starts": Array(self.starts, ("trajectory", "copy", "mode"), "1"),
+        }
+        return Packed(arrays, {"kind": self.kind})
+
+    @classmethod
+    def unpack(cls, packed: Packed, modes: Modes) -> Nearest:
+        """The inverse of :meth:`pack`."""
+        return cls(packed.arrays["states"].values[...], packed.arrays["starts"].values[...], modes)
+
+    @cached_property
+    def _tree(self) -> Any:
+        from scipy.spatial import cKDTree  # noqa: PLC0415  (what only reads a predictor goes without)
+
+        return cKDTree(self.states.reshape(-1, self.states.shape[2]))

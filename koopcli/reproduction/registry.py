@@ -1,0 +1,8 @@
+"""The methods of the paper by name."""
+
+from __future__ import annotations
+
+from koopcli.reproduction import edmd, eigen
+from koopcli.reproduction.report import Method
+
+METHODS: dict[str, Method] = {module.METHOD.name: module.METHOD for module in (edmd, eigen)}

@@ -1,0 +1,114 @@
+"""What a reproduction consists of: a method's cells, their scores, and the tables made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from koopcli.config.experiment import Experiment
+from koopcli.config.settings import ImageFormat
+from koopcli.records import Meta
+from koopcli.stages.base import Task
+from koopcli.stages.pipeline import Pipeline
+from koopcli.store import Record
+
+REDUCED = "This run is not of the paper's size: its figures cannot be put beside the paper's."
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of texts."""
+
+    title: str
+    header: list[str]
+    rows: list[list[str]]
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A cell of a method with the figures of its evaluation and the record that holds them."""
+
+    cell: Any
+    figures: Meta
+    record: Record
+
+
+@dataclass(frozen=True)
+class Run:
+    """Every cell of an experiment, scored. ``label`` tells runs apart: "here", or what was changed."""
+
+    label: str
+    experiment: Experiment
+    scored: tuple[Scored, ...]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure of the report: its task and what stands under it."""
+
+    task: Task
+    caption: str
+
+
+@dataclass(frozen=True)
+class Method:
+    """One of the paper's methods."""
+
+    name: str
+    title: str
+    cells: Callable[[Experiment], Iterator[tuple[Any, Task]]]
+    """Every cell (a flat dataclass) of an experiment with its evaluation."""
+    tables: Callable[[Sequence[Run]], list[Table]]
+    """What is shown, paper versus here first."""
+    notes: Callable[[Sequence[Run]], list[str]]
+    """What the tables mean."""
+    pictures: Callable[[Run, ImageFormat], list[Picture]]
+    """The figures of a run."""
+    fixed: Mapping[str, str]
+    """Settings that the method sweeps over or fixes, and what to write instead."""
+    uses: Callable[[str], bool]
+    """Whether a setting has an effect on the method."""
+
+
+def run_cells(method: Method, experiment: Experiment, pipeline: Pipeline, label: str) -> Run:
+    """Make or find every cell, with a progress display."""
+    scored = []
+    cells = list(method.cells(experiment))
+    with pipeline.reporter.progress(f"reproduce {method.name}, {label}") as progress:
+        for i, (cell, task) in enumerate(cells):
+            progress(i, len(cells))
+            artefact = pipeline.make(task)
+            scored.append(Scored(cell, artefact.figures, artefact.record))
+    return Run(label, experiment, tuple(scored))
+
+
+def full_table(method: Method, runs: Sequence[Run]) -> Table:
+    """Every figure of every cell."""
+    about = list(vars(runs[0].scored[0].cell))
+    header = ["run", *about, "mean", "std", "median", "max", "start", "relift mean", "printed mean"]
+    header += ["max yaw error (rad/s)", "worst in emptiest", "diverged", "artefact"]
+    rows = []
+    for run in runs:
+        for scored in run.scored:
+            figures = scored.figures
+            numbers = [figures["rmse"][statistic] for statistic in ("mean", "std", "median", "max")]
+            numbers += [figures[name]["mean"] for name in ("start_error", "rmse_relift", "rmse_printed")]
+            numbers += [figures["max_error"]["yaw_rate"], figures["worst_in_emptiest"]]
+            text = [f"{number:.4g}" for number in numbers]
+            cell = [str(value) for value in vars(scored.cell).values()]
+            rows.append([run.label, *cell, *text, str(figures["diverged"]), scored.record.name])
+    return Table(f"Every evaluation of {method.title}, RMSE in %", header, rows)
+
+
+def score_text(figures: Meta | None, unit: str = "", digits: int = 3) -> str:
+    """``mean ± std (median)`` of the RMSE to ``digits``, the deviation to one less."""
+    if figures is None:
+        return "–"
+    rmse = figures["rmse"]
+    return f"{rmse['mean']:.{digits}g} ± {rmse['std']:.{digits - 1}g} ({rmse['median']:.{digits}g}){unit}"
+
+
+def count_text(*numbers: int) -> str:
+    """Counts with thousands apart, joined by a times sign."""
+    return " × ".join(f"{number:,}".replace(",", " ") for number in numbers)

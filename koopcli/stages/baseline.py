@@ -1,0 +1,29 @@
+"""Stage ``baseline``: a prediction that fits nothing, set beside predictors of the same trajectories."""
+
+from __future__ import annotations
+
+from koopcli.checks import build
+from koopcli.config.settings import Baseline
+from koopcli.koopman.baselines import Forecast
+from koopcli.koopman.edmd import coverage
+from koopcli.records import Trajectories
+from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage
+
+
+def _run(settings: Baseline, inputs: Inputs, context: Context) -> Forecast:
+    t: Trajectories = inputs["trajectories"]
+    return Forecast(settings.kind, t.dt, coverage(t), t.state_channels, t.input_channels, t.plant)
+
+
+STAGE = Stage(
+    name="baseline",
+    version=1,
+    settings=lambda values: build(Baseline, values),
+    run=_run,
+    unpack=Forecast.unpack,
+    figures=lambda forecast: {"kind": forecast.kind, "functions": forecast.functions},
+    describe=lambda f: f"{f['kind']}, fits nothing",
+    check=lambda task: None,
+    estimate=lambda task: Cost(0.1, 2e6),
+    predicts=lambda task: Prospect(functions=0),
+)

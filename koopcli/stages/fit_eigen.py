@@ -1,0 +1,120 @@
+"""Stage ``fit-eigen``: a predictor from trajectories by eigenfunctions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from koopcli.checks import build
+from koopcli.config.settings import BoxSample, FitEigen, GridSample
+from koopcli.errors import InvalidValueError
+from koopcli.koopman import eigenfunctions
+from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.recurrence import check_recurrence, check_starts
+from koopcli.records import FloatArray, Trajectories
+from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task, refuse_beyond_memory
+from koopcli.stages.fit_edmd import describe, figures
+from koopcli.vehicles.plants import PLANTS, remembered_plant
+
+
+def _run(settings: FitEigen, inputs: Inputs, context: Context) -> Predictor:
+    trajectories: Trajectories = inputs["trajectories"]
+    context.progress(0, 2)
+    x = eigenfunctions.autonomous(trajectories)
+    _check_surface(x, trajectories, context)
+    context.progress(1, 2)
+    predictor = eigenfunctions.fit(
+        trajectories,
+        degree=settings.degree,
+        boundary=settings.boundary,
+        centres=settings.centres,
+        seed=settings.seed,
+        scaling=settings.scaling,
+        cut=settings.cut,
+        tabulated=_tabulated(settings, trajectories.dt),
+    )
+    if predictor.rank < predictor.directions:
+        context.warn(
+            f"the cut keeps {predictor.rank} of {predictor.directions} directions (condition "
+            f"{predictor.condition:.1e}), and the errors depend on it: compare with another --cut"
+        )
+    return predictor
+
+
+def _check_surface(x: FloatArray, trajectories: Trajectories, context: Context) -> None:
+    """The method's assumption: a surface of initial states that no trajectory comes back to."""
+    repeated = check_starts(x)
+    if repeated:
+        context.warn(
+            f"{repeated} of {len(x)} initial states are repeated; they are kept and count as often as they come"
+        )
+    if not trajectories.plant:
+        check_recurrence(x, trajectories.dt)
+        return
+    plant, u = remembered_plant(trajectories.plant), np.asarray(trajectories.u[0])[:1]
+    check_recurrence(
+        x, trajectories.dt, plant.kinetic_energy, lambda states: plant.rhs(states, np.repeat(u, len(states), axis=0))
+    )
+
+
+def _tabulated(settings: FitEigen, dt: float) -> int:
+    """Steps of each trajectory that are looked up."""
+    steps = settings.tabulate / dt
+    if abs(steps - round(steps)) > 1e-6 * steps or round(steps) < 1:
+        raise InvalidValueError(
+            f"'fit-eigen.tabulate' must be a whole number of sampling periods of {dt:g} s, got {settings.tabulate:g} s"
+        )
+    return round(steps)
+
+
+def _check(task: Task) -> None:
+    simulation, sample = task.find("simulate"), task.find("sample")
+    if simulation is None:
+        return
+    plant, steps = simulation.settings, simulation.settings.steps
+    n_x = len(PLANTS[plant.plant].states)
+    if sample is not None and isinstance(sample.settings, (GridSample, BoxSample)):
+        moving = not isinstance(sample.settings, BoxSample) or sample.settings.excitation != "none"
+        if moving and simulation.key is None:
+            raise InvalidValueError(
+                f"a sample of kind '{sample.settings.kind}' drives its trajectories with inputs that change, and an "
+                "eigenfunction e^(λt) g(x0) belongs to a system that runs by itself: use a sample of kind 'ellipsoid', "
+                "or fit with fit-edmd"
+            )
+    eigenfunctions.check_window(steps, _tabulated(task.settings, plant.dt), plant.dt)
+    eigenfunctions.check_modes(eigenfunctions.lattice_size(n_x, task.settings.degree), steps)
+    refuse_beyond_memory("the fit", 3 * _estimate(task).bytes, "fit-eigen.centres or fit-eigen.degree")
+
+
+def _prospect(task: Task) -> Prospect:
+    simulation, sample = task.find("simulate"), task.find("sample")
+    n_x = len(PLANTS[simulation.settings.plant].states) if simulation is not None else 3
+    copies = n_x
+    if task.settings.boundary == "thin-plate":
+        starts = sample.settings.trajectories if sample is not None else task.settings.centres
+        copies = min(starts, task.settings.centres)
+    horizon = None
+    if simulation is not None:
+        horizon = simulation.settings.steps - _tabulated(task.settings, simulation.settings.dt)
+    return Prospect(copies * eigenfunctions.lattice_size(n_x, task.settings.degree), horizon)
+
+
+def _estimate(task: Task) -> Cost:
+    simulation, sample = task.ancestor("simulate").settings, task.ancestor("sample").settings
+    J, steps, functions = sample.trajectories, simulation.steps, _prospect(task).functions
+    copies = min(J, task.settings.centres) if task.settings.boundary == "thin-plate" else functions
+    table = 3 * J * (1 + round(task.settings.tabulate / simulation.dt))
+    return Cost(0.3 + 5e-9 * J * copies**2 + 1e-9 * J * steps * copies, 8.0 * (2 * table + J * copies + 7 * functions))
+
+
+STAGE = Stage(
+    name="fit-eigen",
+    version=1,
+    settings=lambda values: build(FitEigen, values),
+    run=_run,
+    unpack=Predictor.unpack,
+    figures=figures,
+    describe=describe,
+    check=_check,
+    estimate=_estimate,
+    predicts=_prospect,
+)

@@ -1,0 +1,8 @@
+"""The stages that make predictors. A new method is one file and one line here."""
+
+from __future__ import annotations
+
+from koopcli.stages import baseline, fit_edmd, fit_eigen
+from koopcli.stages.base import Stage
+
+MAKERS: dict[str, Stage] = {module.STAGE.name: module.STAGE for module in (fit_edmd, fit_eigen, baseline)}
