@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from koopcli.config.settings import Series
 from koopcli.errors import InvalidValueError
 from koopcli.figures.drawing import Drawing, column
-from koopcli.figures.style import COLUMN, SHADES, TRAINING, render, style
+from koopcli.figures.style import COLUMN, SHADES, TRAINING, axis_label, render, style
 from koopcli.koopman.evaluation import Evaluation
 from koopcli.records import Array, Channels, FloatArray, Trajectories
 
@@ -53,7 +53,7 @@ def drawing(series: Sequence[Series], inputs: Mapping[str, Any], image: str) -> 
 
 def draw(shown: ErrorMap) -> Figure:
     """The first two states against one another, and the last two, over the training trajectories in grey."""
-    names = [f"{n} ({u})".replace("_", " ") for n, u in zip(shown.channels.names, shown.channels.units, strict=True)]
+    names = [axis_label(n, u) for n, u in zip(shown.channels.names, shown.channels.units, strict=True)]
     n_x = len(names)
     top = float(np.quantile(shown.rmse, LARGEST_SHOWN))
     size = 1 + 14 * np.clip(shown.rmse / top, 0, 1)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from koopcli.config.settings import Series
 from koopcli.errors import InvalidValueError
 from koopcli.figures.drawing import Drawing, column
-from koopcli.figures.style import COLOURS, COLUMN, render, style
+from koopcli.figures.style import COLOURS, COLUMN, axis_label, render, style
 from koopcli.koopman.evaluation import Evaluation, Forecaster
 from koopcli.records import Array, Channels, FloatArray, Trajectories
 
@@ -63,9 +63,10 @@ def draw(shown: MeanTrajectory) -> Figure:
             axes.plot(shown.time, shown.predicted[:, i], "--", color=COLOURS[1], label="predicted")
             axes.plot(shown.time[0], shown.true[0, i], "o", color=COLOURS[0])
             axes.plot(shown.time[0], shown.predicted[0, i], "s", color=COLOURS[1])
-            axes.set_ylabel(f"{shown.channels.names[i]} ({shown.channels.units[i]})".replace("_", " "))
+            axes.set_ylabel(axis_label(shown.channels.names[i], shown.channels.units[i]))
         panels[-1].set_xlabel("time (s)")
+        figure.align_ylabels()
         handles, labels = panels[0].get_legend_handles_labels()
-        title = f"RMSE {shown.rmse:.3g} % (mean of all {shown.mean:.3g} %)"
+        title = f"RMSE {shown.rmse:.4g} % (mean of all {shown.mean:.4g} %)"
         figure.legend(handles, labels, loc="outside lower center", ncols=2, title=title)
     return figure

@@ -38,6 +38,12 @@ STYLE = {
 }
 
 
+def axis_label(name: str, unit: str) -> str:
+    """A state with its unit: a symbol with its index, or plain words."""
+    symbol, _, index = name.partition("_")
+    return f"${symbol}_{{{index}}}$ ({unit})" if len(symbol) == 1 and index else f"{name.replace('_', ' ')} ({unit})"
+
+
 def style() -> AbstractContextManager[None]:
     """The style for the time of a ``with``; no global state stays changed."""
     return mpl.rc_context(STYLE)  # type: ignore[arg-type]

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.coverage import STATES_LIMIT, coverage_of
-from koopcli.koopman.modes import ComplexArray, Modes, exponentials
+from koopcli.koopman.modes import ComplexArray, Modes, exponentials, newton_couplings
 from koopcli.koopman.predictor import Predictor
 from koopcli.koopman.tabulated import Nearest
 from koopcli.records import FloatArray, Trajectories
@@ -45,13 +45,15 @@ def fit(
     check_growth(rates, trajectories.steps * dt)
     cut = np.finfo(float).eps * x.shape[1] if cut is None else cut
     domain = np.stack([x.min(axis=(0, 1)), x.max(axis=(0, 1))])
+    window = trajectories.steps * dt
+    block = Modes(rates, newton_couplings(rates, window), 1, dt)
     if boundary == "thin-plate":
         half = (domain[1] - domain[0]) / 2
         scale = np.where(half > 0, half, 1.0) if scaling == "extent" else np.ones(x.shape[2])
-        solution = fit_given(x, thin_plate(x[:, 0], draw_centres(x, centres, seed), scale), rates, dt, cut)
+        solution = fit_given(x, thin_plate(x[:, 0], draw_centres(x, centres, seed), scale), block, cut)
     else:
-        solution = fit_free(x, rates, dt, cut)
-    modes = Modes(rates, solution.starts.shape[1], dt)
+        solution = fit_free(x, block, cut)
+    modes = replace(block, copies=solution.starts.shape[1])
     table = x[:, : tabulated + 1]
     spread = table.reshape(-1, x.shape[2])
     spread = spread[:: max(1, math.ceil(len(spread) / STATES_LIMIT))]
@@ -173,6 +175,34 @@ class Solution:
     condition: float
 
 
+@dataclass(frozen=True)
+class _Time:
+    """The exponentials over the window, taken apart: e^{λt} / length = ``left`` · diag(``singular``) · …
+
+    ``driven`` (L, L) writes the columns of ``left`` as what a block does when its first state is set, ``seen`` as what
+    its last state does when all are set.
+    """
+
+    left: FloatArray
+    singular: FloatArray
+    driven: FloatArray
+    seen: FloatArray
+
+
+def _time(modes: Modes, samples: int) -> _Time:
+    """The time part of the regressors, in coordinates in which sums of it lose no digits (7.2)."""
+    V = exponentials(modes.rates, modes.dt * np.arange(float(samples)))
+    left, singular, _ = np.linalg.svd(V / _lengths(V), full_matrices=False)
+    powers = modes.powers(samples - 1)
+    return _Time(left, singular, _coordinates(powers[:, :, 0], left), _coordinates(powers[:, -1, :], left))
+
+
+def _coordinates(basis: FloatArray, values: FloatArray) -> FloatArray:
+    """``values`` (samples, m) in the columns of ``basis`` (samples, L), (L, m)."""
+    size = _lengths(basis)
+    return np.asarray(np.linalg.lstsq(basis / size, values, rcond=None)[0] / size[:, np.newaxis])
+
+
 def thin_plate(x: FloatArray, centres: FloatArray, scale: FloatArray) -> FloatArray:
     """g(x) = r² log r with r the distance in ``scale``d coordinates (7.5), 0 at 0: (n, centres)."""
     squared = ((x[:, np.newaxis] - centres) / scale) ** 2
@@ -187,51 +217,47 @@ def draw_centres(x: FloatArray, count: int, seed: int) -> FloatArray:
     return np.asarray(flat.mean(axis=0) + flat.std(axis=0) * drawn)
 
 
-def fit_given(x: FloatArray, g: FloatArray, rates: ComplexArray, dt: float, cut: float) -> Solution:
+def fit_given(x: FloatArray, g: FloatArray, modes: Modes, cut: float) -> Solution:
     """C by least squares of ``x`` (J, samples, n_x) on g(x_0) ⊗ e^{λt}, for ``g`` (J, functions), eq. (7.7).
 
     The singular values of the regressors are the products of those of their two factors, columns scaled to length
     one; directions below ``cut`` times the largest are left out. The functions g are recombined to be orthonormal on
-    the initial states: the same eigenfunctions span the same fit, without the loss of digits that near-dependent g
-    cost a sum C z.
+    the initial states: the same eigenfunctions span the same fit, without the digits that near-dependent g would cost.
+    ``modes`` has one copy here.
     """
-    V = exponentials(rates, dt * np.arange(x.shape[1]))
-    v_size = _lengths(V)
-    g_left, g_singular, _ = np.linalg.svd(g / _lengths(g), full_matrices=False)
-    v_left, v_singular, v_right = np.linalg.svd(V / v_size, full_matrices=False)
-    singular = np.outer(g_singular, v_singular)
-    keep = singular > cut * singular.max()
-    seen = np.tensordot(np.tensordot(g_left.T, x, axes=1), v_left, axes=(1, 0))  # (copies, n_x, L)
-    C = np.where(keep, seen.transpose(1, 0, 2), 0.0) / v_singular @ (v_right / v_size)
+    time = _time(modes, x.shape[1])
+    left, singular, _ = np.linalg.svd(g / _lengths(g), full_matrices=False)
+    both = np.outer(singular, time.singular)
+    keep = both > cut * both.max()
+    seen = np.tensordot(np.tensordot(left.T, x, axes=1), time.left, axes=(1, 0))  # (copies, n_x, L)
+    C = np.where(keep, seen.transpose(1, 0, 2), 0.0) @ time.driven.T
     return Solution(
-        starts=g_left[:, :, np.newaxis],
+        starts=left[:, :, np.newaxis],
         C=C.reshape(x.shape[2], -1),
         rank=int(keep.sum()),
-        directions=singular.size,
-        condition=_ratio(singular),
+        directions=both.size,
+        condition=_ratio(both),
     )
 
 
-def fit_free(x: FloatArray, rates: ComplexArray, dt: float, cut: float) -> Solution:
+def fit_free(x: FloatArray, modes: Modes, cut: float) -> Solution:
     """The best boundary values for every state, rate and trajectory of ``x`` (J, samples, n_x), eq. (7.8).
 
-    One small least squares for each trajectory, all with the same regressors; ``C`` then only adds the modes up.
+    One small least squares for each trajectory, all with the same regressors; ``C`` then only reads off the last state
+    of each block. ``modes`` has one copy here.
     """
-    V = exponentials(rates, dt * np.arange(x.shape[1]))
-    size = _lengths(V)
-    left, singular, right = np.linalg.svd(V / size, full_matrices=False)
-    keep = singular > cut * singular[0]
-    weights = np.tensordot(x, left[:, keep] / singular[keep], axes=(1, 0)) @ (right[keep] / size)  # (J, n_x, L)
-    second = rates.imag < 0
-    n_x, L = x.shape[2], len(rates)
+    time = _time(modes, x.shape[1])
+    keep = time.singular > cut * time.singular[0]
+    starts = np.tensordot(x, time.left[:, keep], axes=(1, 0)) @ time.seen[:, keep].T  # (J, n_x, L)
+    n_x, L = x.shape[2], len(modes.rates)
     C = np.zeros((n_x, n_x, L))
-    C[np.arange(n_x), np.arange(n_x)] = ~second
+    C[np.arange(n_x), np.arange(n_x), -1] = 1.0
     return Solution(
-        starts=np.where(second, -weights, weights),
+        starts=starts,
         C=C.reshape(n_x, -1),
         rank=int(keep.sum()),
         directions=L,
-        condition=_ratio(singular),
+        condition=_ratio(time.singular),
     )
 
 

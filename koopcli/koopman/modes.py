@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,18 +12,20 @@ from koopcli.records import FloatArray
 
 ComplexArray = npt.NDArray[np.complex128]
 IndexArray = npt.NDArray[np.intp]
-Times = npt.NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True)
 class Modes:
-    """A block diagonal A that repeats one block of modes ``copies`` times.
+    """A that repeats one small block ``copies`` times, the block given by its continuous rates (7.2).
 
-    ``rates`` (L,) in 1/s; a complex one is followed by its conjugate, and the two states of the pair are the real and
-    the imaginary part of g e^{λt} (7.2). ``dt`` in s. The lifted state (copies · L,) runs through the rates fastest.
+    ``rates`` (L,) in 1/s, a complex one followed by its conjugate; ``couplings`` (L-1,) in 1/s: how each state drives
+    the next one. Without couplings every state is an eigenfunction; with them the block spans the same exponentials in
+    Newton's form, in which nearly equal rates cost no digits. ``dt`` in s. The lifted state (copies · L,) runs through
+    a block fastest.
     """
 
     rates: ComplexArray
+    couplings: FloatArray
     copies: int
     dt: float
 
@@ -38,35 +39,49 @@ class Modes:
         """Eigenvalues e^{λ dt} of one block of the discrete A."""
         return np.exp(self.rates * self.dt)
 
-    @property
-    def leading(self) -> npt.NDArray[np.bool_]:
-        """Which states of a block are real modes or the first of a pair, (L,)."""
-        return np.asarray(self.rates.imag >= 0)
+    @cached_property
+    def generator(self) -> FloatArray:
+        """The block of the continuous system, ż = K z, (L, L) in 1/s: real form of the rates, couplings below."""
+        L = len(self.rates)
+        K = np.diag(self.rates.real) + np.diag(self.couplings, -1)
+        for first in np.flatnonzero(self.rates.imag > 0):
+            frequency = self.rates[first].imag
+            K[first, first + 1], K[first + 1, first] = -frequency, frequency
+        assert K.shape == (L, L)
+        return np.asarray(K)
 
     @cached_property
-    def _partner(self) -> IndexArray:
-        """The other state of a pair, or the state itself, (L,)."""
-        return np.arange(len(self.rates)) + np.sign(self.rates.imag).astype(np.intp)
+    def block(self) -> FloatArray:
+        """The block of the discrete A, e^{K dt}, (L, L)."""
+        from scipy.linalg import expm  # noqa: PLC0415  (what only reads a predictor goes without)
+
+        return np.asarray(expm(self.generator * self.dt))
 
     def __rmatmul__(self, rows: FloatArray) -> FloatArray:
         """``rows`` (..., N) times A."""
-        blocks: FloatArray = rows.reshape(*rows.shape[:-1], self.copies, len(self.rates))
-        same, other = self.eigenvalues.real, self.eigenvalues.imag
-        return np.asarray(blocks * same + blocks[..., self._partner] * other).reshape(rows.shape)
+        blocks = rows.reshape(*rows.shape[:-1], self.copies, len(self.rates))
+        return np.asarray(blocks @ self.block).reshape(rows.shape)
 
-    def evolve(self, blocks: FloatArray, t: Times) -> FloatArray:
-        """The lifted states ``blocks`` (n, copies, L or 1) after the times ``t`` (n,) in s, as (n, copies, L).
-
-        One column stands for the same g in every mode: the start (g, 0) of each pair.
-        """
-        growth = np.exp(self.rates * t[:, np.newaxis])[:, np.newaxis]  # (n, 1, L)
-        if blocks.shape[-1] != len(self.rates):
-            first = np.where(self.leading, growth.real, -growth.imag)  # sin of the pair's own frequency
-            return np.asarray(blocks * first)
-        return np.asarray(blocks * growth.real - blocks[..., self._partner] * growth.imag)
+    def powers(self, steps: int) -> FloatArray:
+        """The block after 0 .. ``steps`` steps, (steps + 1, L, L)."""
+        powers = np.empty((steps + 1, *self.block.shape))
+        powers[0] = np.eye(len(self.block))
+        for k in range(steps):
+            powers[k + 1] = self.block @ powers[k]
+        return powers
 
 
-def exponentials(rates: ComplexArray, t: Times) -> FloatArray:
-    """e^{λt} in real form (len(t), L): e^{at} of a real rate, e^{at} cos ωt and e^{at} sin ωt of a pair (7.2)."""
+def newton_couplings(rates: ComplexArray, seconds: float) -> FloatArray:
+    """Couplings (L-1,) that keep the states of a block of one size over a window of ``seconds`` (7.2).
+
+    The two states of a complex pair are coupled by their frequency alone.
+    """
+    couplings = np.arange(1.0, len(rates)) / seconds
+    couplings[rates.imag[:-1] > 0] = 0.0
+    return couplings
+
+
+def exponentials(rates: ComplexArray, t: FloatArray) -> FloatArray:
+    """e^{λt} in real form (len(t), L): e^{at} of a real rate, e^{at} cos ωt and e^{at} sin ωt of a pair (7.1)."""
     growth = np.exp(rates * t[:, np.newaxis])
     return np.where(rates.imag >= 0, growth.real, -growth.imag)

@@ -17,7 +17,6 @@ from koopcli.koopman.tabulated import Nearest
 from koopcli.records import Array, Channels, FloatArray, Meta, Packed
 
 SEGMENT = 128  # steps whose responses are formed together
-PARTS = ("mode", "real and imaginary")
 TABLES = {Nearest.kind: Nearest.unpack}  # lifts that look eigenfunctions up
 
 
@@ -123,7 +122,8 @@ class Predictor:
             A = arrays["A"].values[...]
         else:
             rates = arrays["rates"].values[...]
-            A = Modes(rates[:, 0] + 1j * rates[:, 1], meta["copies"], meta["dt"])
+            couplings = arrays["couplings"].values[...]
+            A = Modes(rates[:, 0] + 1j * rates[:, 1], couplings, meta["copies"], meta["dt"])
         return cls(
             observables=_unpack_lift(Packed(_below("lift/", arrays), meta["lift"]), A),
             A=A,
@@ -152,13 +152,13 @@ def check_horizon(steps: int, horizon: int | None) -> None:
 
 
 def _pack_operator(A: FloatArray | Modes) -> dict[str, Array]:
-    """A as a matrix, or the continuous rates of its repeated block beside their discrete eigenvalues."""
+    """A as a matrix, or the continuous rates and couplings of its repeated block beside the discrete block itself."""
     if not isinstance(A, Modes):
         return {"A": Array(A, ("lifted", "lifted"), "1")}
-    rates, eigenvalues = A.rates, A.eigenvalues
     return {
-        "rates": Array(np.column_stack([rates.real, rates.imag]), PARTS, "1/s"),
-        "eigenvalues": Array(np.column_stack([eigenvalues.real, eigenvalues.imag]), PARTS, "1"),
+        "rates": Array(np.column_stack([A.rates.real, A.rates.imag]), ("mode", "real and imaginary"), "1/s"),
+        "couplings": Array(A.couplings, ("mode",), "1/s"),
+        "A/block": Array(A.block, ("state of a block", "state of a block"), "1"),
     }
 
 

@@ -12,6 +12,7 @@ from koopcli.records import FloatArray
 
 ONE_LEVEL = 1e-6  # relative spread of the energies of states that count as one level
 TOUCH = 1e-3  # of the distance between two samples: a start nearer to the path than that lies on it
+NEAR = 0.1  # of the same: a start nearer to the straight way than that is looked at closely
 REST = 1e-12  # of the largest state: a trajectory that moves less is at rest
 
 Energy = Callable[[FloatArray], FloatArray]
@@ -86,22 +87,40 @@ def _passes_a_start(x: FloatArray) -> _Return | None:
     """The first path that leads through an initial state again, between its samples k and k + 1 with k ≥ 1."""
     from scipy.spatial import cKDTree  # noqa: PLC0415
 
-    J, samples, n_x = x.shape
     scale = np.abs(x).max(axis=(0, 1))
-    scale[scale == 0] = 1.0
-    starts = x[:, 0] / scale
-    path = np.concatenate([x[:, 1:], x[:, -1:]], axis=1) / scale  # the last sample is a stretch of no length
-    nearest = cKDTree(starts).query(path.reshape(-1, n_x))[1].reshape(J, samples)
-    along = path[:, 1:] - path[:, :-1]
-    length = np.linalg.norm(along, axis=2)
-    for candidate in (nearest[:, :-1], nearest[:, 1:]):  # the start nearest to either end of a stretch
-        way = starts[candidate] - path[:, :-1]
-        share = np.clip((way * along).sum(axis=2) / np.where(length > 0, length, 1.0) ** 2, 0.0, 1.0)
-        touches = np.linalg.norm(share[..., np.newaxis] * along - way, axis=2) <= np.maximum(TOUCH * length, REST)
-        if touches.any():
-            j, k = np.argwhere(touches)[0]
-            return _Return(int(j), int(k) + 1, int(candidate[j, k]))
-    return None
+    path = x / np.where(scale > 0, scale, 1.0)
+    path = np.concatenate([path, path[:, -1:]], axis=1)  # the last sample is a stretch of no length
+    starts = path[:, 0]
+    nearest = cKDTree(starts).query(path.reshape(-1, path.shape[2]))[1].reshape(path.shape[:2])
+    found: list[_Return] = []
+    for end in (0, 1):  # the start nearest to either end of a stretch
+        candidate = nearest[:, 1 + end : path.shape[1] - 1 + end]
+        miss, length = _miss(path[:, 1:-1], path[:, 2:], starts[candidate])
+        for j, k in np.argwhere(miss <= np.maximum(NEAR * length, REST)):
+            fine = _curve(path[j], k + 1)
+            miss_there, _ = _miss(fine[:-1], fine[1:], starts[candidate[j, k]])
+            if miss_there.min() <= max(TOUCH * length[j, k], REST):
+                found.append(_Return(int(j), int(k) + 1, int(candidate[j, k])))
+                break
+    return min(found, default=None)
+
+
+def _miss(start: FloatArray, stop: FloatArray, goal: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """How far the straight way from ``start`` to ``stop`` (..., n_x) passes ``goal``, and how long it is, (...,)."""
+    along, way = stop - start, goal - start
+    length = np.linalg.norm(along, axis=-1)
+    share = np.clip((way * along).sum(axis=-1) / np.where(length > 0, length, 1.0) ** 2, 0.0, 1.0)
+    return np.linalg.norm(share[..., np.newaxis] * along - way, axis=-1), length
+
+
+def _curve(path: FloatArray, k: int) -> FloatArray:
+    """The cubic through the four samples around the stretch from k to k + 1, at points along it."""
+    count = min(4, len(path))
+    first = min(max(k - 1, 0), len(path) - count)
+    nodes = np.arange(count)
+    s = k - first + np.linspace(0.0, 1.0, 33)
+    weights = [np.prod([(s - m) / (n - m) for m in nodes if m != n], axis=0) for n in nodes]
+    return np.asarray(np.stack(weights, axis=1) @ path[first : first + count])
 
 
 def _text(x: FloatArray) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from koopcli.koopman.modes import IndexArray, Modes, exponentials
+from koopcli.koopman.modes import IndexArray, Modes
 from koopcli.records import Array, FloatArray, Packed
 
 
@@ -17,7 +17,7 @@ class Nearest:
     """ψ(x) = ψ of the nearest tabulated sample, in raw SI units (7.6).
 
     ``states`` (J, K, n_x): the samples k = 0..K-1 of J trajectories; ``starts`` (J, copies, L): the lifted states of
-    their initial states, or (J, copies, 1) where every mode starts with the same value; ``modes`` carries them on.
+    their initial states, or (J, copies, 1) where only the first state of a block is set; ``modes`` carries them on.
     """
 
     states: FloatArray
@@ -34,19 +34,19 @@ class Nearest:
     def lift(self, x: FloatArray) -> FloatArray:
         """ψ(x) (n, N) of the states (n, n_x)."""
         j, k = self.nearest(x)
-        return self.modes.evolve(self.starts[j], k * self.modes.dt).reshape(len(x), self.functions)
+        driving = self._powers[k][:, :, : self.starts.shape[2]]
+        return np.asarray(np.matmul(self.starts[j], driving.transpose(0, 2, 1))).reshape(len(x), self.functions)
 
     def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
         """rows · ψ(x) as (n, R), for ``rows`` (R, N); ψ itself is only formed where it is small."""
         if self.starts.shape[2] == len(self.modes.rates):
             return self.lift(x) @ rows.T
         j, k = self.nearest(x)
-        L = len(self.modes.rates)
-        per_mode = rows.reshape(len(rows), self.modes.copies, L).transpose(1, 0, 2).reshape(self.modes.copies, -1)
+        copies, L = self.modes.copies, len(self.modes.rates)
+        by_copy = rows.reshape(len(rows), copies, L).transpose(1, 0, 2).reshape(copies, -1)
         used, position = np.unique(j, return_inverse=True)
-        there = (self.starts[used, :, 0] @ per_mode).reshape(len(used), len(rows), L)
-        growth = exponentials(self.modes.rates, k * self.modes.dt)
-        return np.asarray(np.matmul(there[position], growth[:, :, np.newaxis])[:, :, 0])
+        there = (self.starts[used, :, 0] @ by_copy).reshape(len(used), len(rows), L)
+        return np.asarray(np.matmul(there[position], self._powers[k][:, :, :1])[:, :, 0])
 
     def nearest(self, x: FloatArray) -> tuple[IndexArray, IndexArray]:
         """Trajectory and sample (n,) of the tabulated state nearest to each of ``x`` (n, n_x).
@@ -63,7 +63,7 @@ class Nearest:
         """The table."""
         arrays = {
             "states": Array(self.states, ("trajectory", "sample", "state"), "those of the state"),
-            "starts": Array(self.starts, ("trajectory", "copy", "mode"), "1"),
+            "starts": Array(self.starts, ("trajectory", "copy", "state of a block"), "1"),
         }
         return Packed(arrays, {"kind": self.kind})
 
@@ -71,6 +71,11 @@ class Nearest:
     def unpack(cls, packed: Packed, modes: Modes) -> Nearest:
         """The inverse of :meth:`pack`."""
         return cls(packed.arrays["states"].values[...], packed.arrays["starts"].values[...], modes)
+
+    @cached_property
+    def _powers(self) -> FloatArray:
+        """The block of A after 0 .. K-1 steps, (K, L, L)."""
+        return self.modes.powers(self.states.shape[1] - 1)
 
     @cached_property
     def _tree(self) -> Any:

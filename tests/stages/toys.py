@@ -104,7 +104,7 @@ def _gliding(steps: int = 12) -> Trajectories:
 
 def _looked_up() -> Predictor:
     """A pair of complex rates and a real one, two boundary functions, looked up at three trajectories."""
-    modes = Modes(np.array([-1 + 5j, -1 - 5j, -0.5]), 2, 0.01)
+    modes = Modes(np.array([-1 + 5j, -1 - 5j, -0.5]), np.array([0.0, 2.0]), 2, 0.01)
     starts = 1 + np.sin(np.arange(18.0)).reshape(3, 2, 3)
     C = 10 * np.cos(np.arange(18.0)).reshape(3, 6)
     states = 3 * np.sin(np.arange(45.0) ** 2).reshape(3, 5, 3)

@@ -1,11 +1,15 @@
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
+from koopcli.errors import InvalidValueError
 from koopcli.simulation.integrate import simulate
-from koopcli.vehicles.plants import PLANTS, make_plant
-from koopcli.vehicles.single_track import WHEELS_PER_FORCE, ForceInput
+from koopcli.vehicles.plants import PLANTS, make_plant, remembered_plant
+from koopcli.vehicles.single_track import WHEELS_PER_FORCE, ForceInput, SlipInput
+from tests.conftest import ball_of, surface_of
 
 MIRROR_X = np.array([1, -1, -1])  # v_y and yaw rate change sign
 MIRROR_U = np.array([1, -1, 1, -1])  # lateral forces change sign
@@ -83,3 +87,85 @@ def test_every_plant_keeps_the_contract(name, vehicle):
         x, u = np.ones((5, 2, n_x)), np.ones((5, 2, n_u))
         assert plant.rhs(x, u).shape == x.shape
         assert plant.rhs(np.zeros(n_x), np.zeros(n_u)) == pytest.approx(np.zeros(n_x))
+
+
+def test_the_slip_plant_by_hand(sliding):
+    """Every number written out in plain scalars, with steer and slip on both axles and a velocity in reverse."""
+    from math import atan, atan2, cos, hypot, sin
+
+    v_x, v_y, r = -4.0, 1.5, 0.8
+    steer_f, kappa_f, steer_r, kappa_r = 0.2, 0.05, -0.1, -0.03
+    load = 1300 * 9.81 / 4
+    drag = 0.5 * 0.18 * 1.22 * 2.0 * hypot(v_x, v_y)
+    sum_x, forces_y = -drag * v_x, []
+    for arm, steer, kappa in ((1.3725, steer_f, kappa_f), (-1.3725, steer_r, kappa_r)):
+        at_x, at_y = v_x, v_y + arm * r
+        along, across = cos(steer) * at_x + sin(steer) * at_y, -sin(steer) * at_x + cos(steer) * at_y
+        alpha = -atan2(across, abs(along))
+        by, bx = 8.11 * alpha, 7.0 * kappa
+        F_y = 1.95 * load * sin(1.3 * atan(by - 0.2 * (by - atan(by))))
+        F_x = 2.15 * load * sin(1.6 * atan(bx + 0.5 * (bx - atan(bx))))
+        sum_x += 2 * (cos(steer) * F_x - sin(steer) * F_y)
+        forces_y.append(2 * (sin(steer) * F_x + cos(steer) * F_y))
+    expected = [
+        sum_x / 1300 + r * v_y,
+        (sum(forces_y) - drag * v_y) / 1300 - r * v_x,
+        1.3725 * (forces_y[0] - forces_y[1]) / 1400,
+    ]
+    found = sliding.rhs(np.array([v_x, v_y, r]), np.array([steer_f, kappa_f, steer_r, kappa_r]))
+    assert found == pytest.approx(expected, rel=1e-14)
+
+
+def test_the_slip_plant_is_mirror_symmetric(slips, states):
+    u = np.random.default_rng(5).uniform(-0.3, 0.3, (200, 4))
+    mirrored = slips.rhs(states * MIRROR_X, u * np.array([-1, 1, -1, 1]))  # steer changes sign, slip does not
+    assert mirrored == pytest.approx(slips.rhs(states, u) * MIRROR_X, rel=1e-13, abs=1e-12)
+
+
+def test_small_slips_are_the_linear_bicycle(slips):
+    """v̇_y and ṙ at small angles follow the cornering stiffnesses of the textbook's linear single-track model."""
+    p = slips.parameters
+    v, beta, r, delta = 20.0, 1e-5, 1e-5, 2e-5
+    x, u = np.array([v, v * beta, r]), np.array([delta, 0.0, 0.0, 0.0])
+    C_f = C_r = 2 * p.lateral.B * p.lateral.C * p.lateral.mu * p.m * 9.81 / 4
+    F_f, F_r = C_f * (delta - beta - p.l_f * r / v), C_r * (-beta + p.l_r * r / v)
+    drag = 0.5 * p.c_w * p.rho * p.A * v
+    dx = slips.rhs(x, u)
+    assert dx[1] == pytest.approx((F_f + F_r - drag * v * beta) / p.m - r * v, rel=1e-6)
+    assert dx[2] == pytest.approx((p.l_f * F_f - p.l_r * F_r) / p.Jzz, rel=1e-6)
+
+
+def test_grip_scales_every_tyre_force(sliding, states):
+    from dataclasses import replace
+
+    u = np.random.default_rng(6).uniform(-0.3, 0.3, (200, 4))
+    bare, double = (SlipInput(replace(sliding.parameters, mu_scale=scale)) for scale in (0.0, 2.0))
+    tyres = sliding.rhs(states, u) - bare.rhs(states, u)
+    assert double.rhs(states, u) - bare.rhs(states, u) == pytest.approx(2 * tyres, rel=1e-12, abs=1e-10)
+    assert bare.rhs(states, u) == pytest.approx(ForceInput(sliding.parameters).rhs(states, 0 * u), abs=1e-12)
+
+
+@pytest.mark.parametrize("start", ["surface", "ball"])
+def test_energy_never_grows_on_tyres(slips, start):
+    """Every trajectory of the paper's size and its reverse, relative 1e-9 (a single step per sample fails by 2e-7)."""
+    sample, steps = (surface_of(slips, 441), 150) if start == "surface" else (ball_of(slips), 50)
+    for sign in (1, -1):
+        x0 = sample.states * np.array([sign, sign, 1])
+        u = np.zeros((len(x0), steps, 4))
+        energy = slips.kinetic_energy(simulate(slips.rhs, x0, u, 0.01, fastest_rate=slips.fastest_rate))
+        assert (np.diff(energy, axis=1) <= 1e-9 * energy[:, :-1]).all()
+        assert (energy[:, -1] < energy[:, 0]).all()
+
+
+def test_a_vehicle_without_tyres_is_refused_for_the_slip_plant(vehicle):
+    from dataclasses import replace
+
+    with pytest.raises(InvalidValueError, match=r"give the vehicle file the tables \[lateral\] and"):
+        SlipInput(replace(vehicle, lateral=None))
+
+
+def test_a_plant_is_remembered_through_json(slips):
+    from dataclasses import asdict
+
+    about = {"plant": "slips", "force_per": "axle", "v_eps": 0.3, "vehicle": asdict(slips.parameters)}
+    assert remembered_plant(json.loads(json.dumps(about))) == SlipInput(slips.parameters, 0.3)

@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from koopcli.koopman.coverage import Coverage, coverage_of
+from koopcli.koopman.metrics import overlap_of_largest
+
+
+@pytest.fixture
+def cloud():
+    rng = np.random.default_rng(0)
+    states = rng.uniform(-1, 1, (500, 3)) * [30, 20, 5] + [3, -2, 1]
+    return states, np.stack([states.min(axis=0), states.max(axis=0)])
+
+
+def test_distances_in_half_widths_of_the_data(cloud):
+    states, domain = cloud
+    x = np.random.default_rng(1).uniform(-40, 40, (50, 3))
+    half = (domain[1] - domain[0]) / 2
+    brute = np.sqrt((((x[:, None] - states) / half) ** 2).sum(axis=2)).min(axis=1)
+    coverage = coverage_of(states, domain)
+    assert coverage.distance(x) == pytest.approx(brute, rel=1e-9)
+    assert coverage.distance(states) == pytest.approx(np.zeros(500), abs=1e-12)
+
+
+def test_inside_and_outside_the_hull(cloud):
+    states, domain = cloud
+    coverage = coverage_of(states, domain)
+    assert not coverage.outside(states).any()
+    centre = states.mean(axis=0)
+    mixtures = np.random.default_rng(2).dirichlet(np.ones(500), 100) @ states
+    assert not coverage.outside(mixtures).any()
+    assert coverage.outside(centre + 1.01 * (states[coverage_extreme(states)] - centre)).all()
+    corner = domain[1][np.newaxis]
+    assert coverage.outside(corner).all()  # in the box of the data, and yet outside the data
+
+
+def coverage_extreme(states):
+    from scipy.spatial import ConvexHull
+
+    return ConvexHull(states).vertices
+
+
+def test_states_in_a_plane_fall_back_to_their_box():
+    states = np.random.default_rng(3).uniform(-1, 1, (30, 3)) * [1, 1, 0]
+    domain = np.stack([states.min(axis=0), states.max(axis=0)])
+    coverage = coverage_of(states, domain)
+    assert not coverage.outside(states).any()
+    assert coverage.outside(np.array([[2.0, 0, 0], [0, 0, 3.0]])).all()
+    assert np.isfinite(coverage.distance(np.array([[0.0, 0, 3.0]]))).all()
+
+
+def test_it_survives_storage(cloud):
+    coverage = coverage_of(*cloud)
+    again = Coverage.unpack(coverage.pack("m/s, m/s, rad/s"))
+    x = np.random.default_rng(4).uniform(-40, 40, (50, 3))
+    assert (again.distance(x) == coverage.distance(x)).all()
+    assert (again.outside(x) == coverage.outside(x)).all()
+
+
+def test_the_overlap_of_the_largest():
+    values = np.arange(100.0)
+    assert overlap_of_largest(values, values) == 1.0
+    assert overlap_of_largest(values, -values) == 0.0
+    others = values.copy()
+    others[[95, 96]] = -1  # of the five largest, two are not large here
+    assert overlap_of_largest(values, others) == pytest.approx(0.6)
+    values[20:] = np.nan
+    assert overlap_of_largest(values, others) == 1.0  # 5 % of twenty is one
+    values[5:] = np.nan
+    assert overlap_of_largest(values, -others) == 0.0  # never fewer than one
+    assert np.isnan(overlap_of_largest(np.full(3, np.nan), np.arange(3.0)))
