@@ -5,20 +5,24 @@ BIN := $(VENV)/bin
 KOOP := $(BIN)/koop
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-edmd smoke test check docs pins bench wheel clean
+.PHONY: help reproduce reproduce-edmd reproduce-eigen smoke test check docs pins bench wheel clean
 
 help: ## Show this help
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
 
-reproduce: reproduce-edmd ## Reproduce the paper at full size and print paper versus here
+reproduce: $(VENV)/.installed ## Reproduce the paper at full size, both methods, and print paper versus here
+	$(KOOP) reproduce all
 
 reproduce-edmd: $(VENV)/.installed ## Reproduce the EDMD experiment alone
 	$(KOOP) reproduce edmd
 
-smoke: $(VENV)/.installed ## Run the whole pipeline on a reduced grid, in a store of its own
+reproduce-eigen: $(VENV)/.installed ## Reproduce the eigenfunction experiment alone
+	$(KOOP) reproduce eigen
+
+smoke: $(VENV)/.installed ## Run both methods on reduced datasets, in a store of its own
 	@store=$$(mktemp -d) && trap 'rm -rf "$$store"' EXIT && \
-	$(KOOP) reproduce edmd --smoke --store "$$store" && \
-	$(KOOP) reproduce edmd --smoke --store "$$store" 2>/dev/null
+	$(KOOP) reproduce all --smoke --store "$$store" && \
+	$(KOOP) reproduce all --smoke --store "$$store" 2>/dev/null
 
 test: $(VENV)/.developing ## Run the tests
 	$(BIN)/python -m pytest

@@ -60,7 +60,62 @@ def evaluation(store: Path):
     yield join(parts).figures()["rmse"]["mean"]
 
 
-TASKS = {"fit-product": fit_product, "fit-blocks": fit_blocks, "fit-plain": fit_plain, "evaluation": evaluation}
+def slips(store: Path):
+    from koopcli.simulation.integrate import simulate
+    from koopcli.vehicles.plants import remembered_plant
+
+    data = koopcli.load("simulate", store)
+    plant, x0, u = remembered_plant(data.plant), data.x[:, 0], data.u[:]
+    yield
+    yield float(np.abs(simulate(plant.rhs, x0, u, data.dt, fastest_rate=plant.fastest_rate)).sum())
+
+
+def eigen_fit(store: Path):
+    from scipy.linalg import expm  # noqa: F401  (imports aside)
+    from scipy.spatial import ConvexHull  # noqa: F401
+
+    from koopcli.koopman.eigenfunctions import fit
+
+    data = koopcli.load("simulate", store)
+    yield
+    predictor = fit(data, degree=2, boundary="thin-plate", centres=441, seed=0, scaling="raw", cut=1e-14, tabulated=100)
+    yield float(predictor.rank)
+
+
+def eigen_dense(store: Path):
+    """A tenth of the trajectories and splines as one dense least squares: a hundredth of the unknowns' cost."""
+    from koopcli.koopman.eigenfunctions import dmd_rates, draw_centres, lattice, thin_plate
+    from koopcli.koopman.modes import exponentials
+
+    data = koopcli.load("simulate", store)
+    x = data.x[::10]
+    yield
+    rates = lattice(dmd_rates(x, data.dt), 2)
+    V = exponentials(rates, data.dt * np.arange(float(x.shape[1])))
+    g = thin_plate(x[:, 0], draw_centres(x, 44, 0), np.ones(3))
+    W = np.kron(g, V)
+    yield float(np.linalg.lstsq(W / np.linalg.norm(W, axis=0), x.reshape(-1, 3), rcond=1e-14)[2])
+
+
+def eigen_evaluation(store: Path):
+    from scipy.linalg import expm  # noqa: F401  (imports aside)
+    from scipy.spatial import cKDTree  # noqa: F401
+
+    predictor, test = koopcli.load("fit-eigen", store), koopcli.load("simulate", store / "test")
+    yield
+    yield evaluate(predictor, test, slice(None), 0).figures()["rmse"]["mean"]
+
+
+TASKS = {
+    "fit-product": fit_product,
+    "fit-blocks": fit_blocks,
+    "fit-plain": fit_plain,
+    "evaluation": evaluation,
+    "slips": slips,
+    "eigen-fit": eigen_fit,
+    "eigen-dense": eigen_dense,
+    "eigen-evaluation": eigen_evaluation,
+}
 
 
 if __name__ == "__main__":

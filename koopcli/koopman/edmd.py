@@ -25,6 +25,7 @@ class _Operators(NamedTuple):
     A: FloatArray
     B: FloatArray
     rank: int
+    directions: int
     condition: float
 
 
@@ -77,9 +78,9 @@ def fit(trajectories: Trajectories, basis: Basis, progress: Progress = silent) -
             "lower the order or sample more"
         )
     if trajectories.factors is not None and basis.constant is not None:
-        A, B, rank, condition = _fit_product(trajectories, trajectories.factors, basis, progress)
+        A, B, rank, directions, condition = _fit_product(trajectories, trajectories.factors, basis, progress)
     else:
-        A, B, rank, condition = _fit_blocks(trajectories, basis, progress)
+        A, B, rank, directions, condition = _fit_blocks(trajectories, basis, progress)
     return Predictor(
         observables=basis,
         A=A,
@@ -90,7 +91,7 @@ def fit(trajectories: Trajectories, basis: Basis, progress: Progress = silent) -
         state_channels=trajectories.state_channels,
         input_channels=trajectories.input_channels,
         rank=rank,
-        directions=basis.functions + n_u,
+        directions=directions,
         condition=condition,
         spectral_radius=float(np.abs(np.linalg.eigvals(A)).max()),
         plant=trajectories.plant,
@@ -98,22 +99,30 @@ def fit(trajectories: Trajectories, basis: Basis, progress: Progress = silent) -
 
 
 def _fit_blocks(trajectories: Trajectories, basis: Basis, progress: Progress) -> _Operators:
-    """Least squares on the rows [ψ(x), u], read in blocks; u is centred where the basis has a constant."""
+    """Least squares on the rows [ψ(x), u], read in blocks; u is centred where the basis has a constant.
+
+    Inputs that never move stay out of the regression, where they would only spoil its condition.
+    """
     N, total = basis.functions, len(trajectories) * trajectories.steps
     u_mean = np.zeros(len(trajectories.input_channels))
     if basis.constant is not None:
         u_mean = sum((u.sum(axis=0) for _, u, _ in trajectories.transitions(BLOCK)), u_mean) / total
+    moving = np.zeros(len(u_mean), dtype=bool)
+    for _, u, _ in trajectories.transitions(BLOCK):
+        moving |= _centred(u, u_mean).any(axis=0)
 
     def rows() -> Iterator[tuple[FloatArray, FloatArray]]:
         done = 0
         for x, u, x_next in trajectories.transitions(BLOCK):
-            yield np.hstack([basis.lift(x), _centred(u, u_mean)]), basis.lift(x_next)
+            yield np.hstack([basis.lift(x), _centred(u, u_mean)[:, moving]]), basis.lift(x_next)
             done += len(x)
             progress(done, total)
 
     solution = least_squares(rows)
-    A, B = solution.coefficients[:N].T.copy(), solution.coefficients[N:].T.copy()
-    return _Operators(_fold(A, B, u_mean, basis), B, solution.rank, solution.condition)
+    A, B = solution.coefficients[:N].T.copy(), np.zeros((N, len(u_mean)))
+    B[:, moving] = solution.coefficients[N:].T
+    directions = N + int(moving.sum())
+    return _Operators(_fold(A, B, u_mean, basis), B, solution.rank, directions, solution.condition)
 
 
 def _fit_product(trajectories: Trajectories, product: tuple[int, int], basis: Basis, progress: Progress) -> _Operators:
@@ -126,10 +135,11 @@ def _fit_product(trajectories: Trajectories, product: tuple[int, int], basis: Ba
     u_mean = columns.mean(axis=0)
     centred = _centred(columns, u_mean)
     length = np.linalg.norm(centred, axis=0)
-    length[length == 0] = 1.0
-    left, singular, right = np.linalg.svd(centred / length, full_matrices=False)
-    keep = singular > singular[0] * np.finfo(float).eps * m
-    slopes = (left[:, keep] / singular[keep]) @ right[keep] / length  # Σ_j slopes_j u_jᵀ is the identity
+    moving = length > 0
+    left, singular, right = np.linalg.svd(centred[:, moving] / length[moving], full_matrices=False)
+    keep = singular > singular.max(initial=0.0) * np.finfo(float).eps * m
+    slopes = np.zeros(columns.shape)  # Σ_j slopes_j u_jᵀ is the identity on the inputs that move
+    slopes[:, moving] = (left[:, keep] / singular[keep]) @ right[keep] / length[moving]
     weights = np.column_stack([np.full(m, 1 / m), slopes])
     slope = np.zeros((columns.shape[1], basis.functions))
     few = max(1, BLOCK // m)  # states whose successors are lifted together
@@ -151,7 +161,8 @@ def _fit_product(trajectories: Trajectories, product: tuple[int, int], basis: Ba
     solution = least_squares(rows)
     A, B = solution.coefficients.T.copy(), slope.T / states
     condition = condition_number(np.concatenate([solution.singular_values, singular]))
-    return _Operators(_fold(A, B, u_mean, basis), B, solution.rank + int(keep.sum()), condition)
+    rank, directions = solution.rank + int(keep.sum()), basis.functions + int(moving.sum())
+    return _Operators(_fold(A, B, u_mean, basis), B, rank, directions, condition)
 
 
 def _centred(u: FloatArray, u_mean: FloatArray) -> FloatArray:

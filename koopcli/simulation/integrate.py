@@ -17,8 +17,8 @@ PER_STEP = 2.0  # the fastest rate times the length of a step; Runge-Kutta is st
 MOST_SUBSTEPS = 2**14
 
 
-def rk4_step(rhs: Rhs, x: FloatArray, u: FloatArray, dt: float) -> FloatArray:
-    """One classical Runge-Kutta step of length ``dt`` with ``u`` held (docs/equations.md 2)."""
+def rk4_step(rhs: Rhs, x: FloatArray, u: FloatArray, dt: float | FloatArray) -> FloatArray:
+    """One classical Runge-Kutta step of length ``dt``, one for each row if (n, 1), with ``u`` held (2.1)."""
     k1 = rhs(x, u)
     k2 = rhs(x + dt / 2 * k1, u)
     k3 = rhs(x + dt / 2 * k2, u)
@@ -65,16 +65,23 @@ def simulate(
 
 
 def _sample(rhs: Rhs, x: FloatArray, u: FloatArray, dt: float, fastest_rate: Rate | None) -> FloatArray:
-    """The states one sample later; rows that need the same number of steps go together."""
+    """The states one sample later.
+
+    The sample is walked through in as many ticks as the stiffest row has steps; a row with half as many steps moves at
+    every second tick, and so on, so the rows in motion are always the first so many of those sorted by their steps.
+    """
     rate = fastest_rate(x, u, dt) if fastest_rate is not None else None
     if rate is None:
         return rk4_step(rhs, x, u, dt)
     count = substeps(rate, dt)
+    order = np.argsort(-count, kind="stable")
+    moving, acting, count = x[order], u[order], count[order]
+    ticks = int(count.max(initial=1.0))
+    step = dt / count[:, np.newaxis]
+    for tick in range(ticks):
+        every = tick & -tick if tick else ticks  # the largest power of two that divides the tick
+        rows = slice(0, int(np.count_nonzero(count * every >= ticks)))
+        moving[rows] = rk4_step(rhs, moving[rows], acting[rows], step[rows])
     after = np.empty_like(x)
-    for n in np.unique(count):
-        rows = count == n
-        moving, acting = x[rows], u[rows]
-        for _ in range(int(n)):
-            moving = rk4_step(rhs, moving, acting, dt / n)
-        after[rows] = moving
+    after[order] = moving
     return after

@@ -12,6 +12,7 @@ from koopcli.koopman.predictor import check_horizon
 from koopcli.records import Meta, Packed
 from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task, refuse_beyond_memory
 from koopcli.stages.makers import MAKERS
+from koopcli.vehicles.plants import PLANTS
 
 
 def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
@@ -61,6 +62,12 @@ def _prospect(task: Task) -> Prospect:
 
 
 def _check(task: Task) -> None:
+    trained, tested = task.input("predictor").find("simulate"), task.input("trajectories").settings.plant
+    if trained is not None and PLANTS[trained.settings.plant].inputs != PLANTS[tested].inputs:
+        raise InvalidValueError(
+            f"the predictor is of the plant '{trained.settings.plant}', the test trajectories of '{tested}': "
+            "they have different states or inputs"
+        )
     steps = task.input("trajectories").settings.steps
     check_horizon(steps, _prospect(task).horizon)
     if task.settings.first > steps:

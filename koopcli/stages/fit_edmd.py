@@ -20,14 +20,16 @@ def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
     trajectories: Trajectories = inputs["trajectories"]
     basis = edmd.basis_from_data(trajectories, settings.basis, settings.order)
     predictor = edmd.fit(trajectories, basis, context.progress)
-    unmoved = 0 if predictor.B.any() else len(predictor.input_channels)
-    if predictor.rank < predictor.directions - unmoved:
+    if predictor.rank < predictor.directions:
         context.warn(
             f"the data determine {predictor.rank} of {predictor.directions} directions (condition "
             f"{predictor.condition:.1e}); the others were set to zero: sample more states or inputs, or lower the order"
         )
-    elif unmoved:
-        context.warn("the inputs never move in these data, so B is zero: the predictor knows nothing of inputs")
+    still = [name for name, b in zip(predictor.input_channels.names, predictor.B.T, strict=True) if not b.any()]
+    if still:
+        context.warn(
+            f"{', '.join(still)} never moved in these data, so B is zero there: the predictor knows nothing of it"
+        )
     return predictor
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from koopcli.checks import build
-from koopcli.config.settings import BoxSample, FitEigen, GridSample
+from koopcli.config.settings import BoxSample, FitEigen, GridSample, SampleSettings
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import eigenfunctions
 from koopcli.koopman.predictor import Predictor
@@ -68,21 +68,26 @@ def _tabulated(settings: FitEigen, dt: float) -> int:
 
 def _check(task: Task) -> None:
     simulation, sample = task.find("simulate"), task.find("sample")
+    if sample is not None and _driven(sample.settings):
+        raise InvalidValueError(
+            f"a sample of kind '{sample.settings.kind}' drives its trajectories with inputs that change, and an "
+            "eigenfunction e^(λt) g(x0) belongs to a system that runs by itself: use a sample of kind 'ellipsoid', "
+            "or fit with fit-edmd"
+        )
     if simulation is None:
         return
     plant, steps = simulation.settings, simulation.settings.steps
     n_x = len(PLANTS[plant.plant].states)
-    if sample is not None and isinstance(sample.settings, (GridSample, BoxSample)):
-        moving = not isinstance(sample.settings, BoxSample) or sample.settings.excitation != "none"
-        if moving and simulation.key is None:
-            raise InvalidValueError(
-                f"a sample of kind '{sample.settings.kind}' drives its trajectories with inputs that change, and an "
-                "eigenfunction e^(λt) g(x0) belongs to a system that runs by itself: use a sample of kind 'ellipsoid', "
-                "or fit with fit-edmd"
-            )
     eigenfunctions.check_window(steps, _tabulated(task.settings, plant.dt), plant.dt)
     eigenfunctions.check_modes(eigenfunctions.lattice_size(n_x, task.settings.degree), steps)
     refuse_beyond_memory("the fit", 3 * _estimate(task).bytes, "fit-eigen.centres or fit-eigen.degree")
+
+
+def _driven(sample: SampleSettings) -> bool:
+    """Whether the inputs of a sample change within or between its trajectories."""
+    if isinstance(sample, GridSample):
+        return max(sample.levels) > 0 and len(sample.levels) * sample.columns > 1
+    return isinstance(sample, BoxSample) and sample.excitation != "none" and sample.amplitude > 0
 
 
 def _prospect(task: Task) -> Prospect:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Self
 
 import numpy as np
@@ -101,8 +102,15 @@ class SlipInput:
 
     def rhs(self, x: FloatArray, u: FloatArray) -> FloatArray:
         """Time derivative of ``x`` (..., 3) under ``u`` (..., 4), eqs. (1.1) to (1.3) with (6.1) to (6.4)."""
-        (front_x, front_y), (rear_x, rear_y) = (self._axle_force(x, *axle) for axle in self._axles(u))
-        return _body(self.parameters, x, front_x + rear_x, front_y, rear_y)
+        both, steer, slip_ratio = 2 * self.parameters.mu_scale, _axles(u, 0), _axles(u, 1)
+        w_x, w_y = self._wheel_velocities(x, steer)
+        F_y = both * tyre.force(_of(self.parameters.lateral), tyre.slip_angle(w_x, w_y, self.v_eps), self._loads)
+        F_x = slip_ratio
+        if np.any(slip_ratio):
+            F_x = both * tyre.force(_of(self.parameters.longitudinal), slip_ratio, self._loads)
+        if np.any(steer):
+            F_x, F_y = np.cos(steer) * F_x - np.sin(steer) * F_y, np.sin(steer) * F_x + np.cos(steer) * F_y
+        return _body(self.parameters, x, F_x[..., 0] + F_x[..., 1], F_y[..., 0], F_y[..., 1])
 
     def fastest_rate(self, x: FloatArray, u: FloatArray, dt: float) -> FloatArray:
         """How fast the tyres pull lateral speeds to rest within the next ``dt`` s, (6.5), for ``x`` (..., 3).
@@ -110,55 +118,43 @@ class SlipInput:
         In 1/s, (...,); not more than an estimate, since speeds change in that time.
         """
         p = self.parameters
-        grip = p.mu_scale * max(_of(p.lateral).mu, _of(p.longitudinal).mu)
-        turn = np.abs(x[..., 2])
-        change = dt * (grip * G + turn * (np.abs(x[..., 0]) + np.abs(x[..., 1])))
-        fastest = np.zeros(x.shape[:-1])
-        for arm, load, steer, _ in self._axles(u):
-            v_x, v_y = self._wheel_velocity(x, arm, steer)
-            turning = change + dt * grip * G * abs(arm) * (p.l_f + p.l_r) * p.m / p.Jzz
-            along = np.maximum(np.abs(v_x) - turning, self.v_eps)
-            across = np.maximum(np.abs(v_y) - turning, 0.0)
-            slope = np.where(along >= across, along / (along**2 + across**2), 0.5 / np.maximum(across, self.v_eps))
-            fastest += 2 * p.mu_scale * tyre.stiffness(_of(p.lateral), load) * (1 / p.m + arm**2 / p.Jzz) * slope
-        return fastest
+        grip = p.mu_scale * G * max(_of(p.lateral).mu, _of(p.longitudinal).mu)  # m/s² at most
+        turning = np.abs(x[..., 2]) * (np.abs(x[..., 0]) + np.abs(x[..., 1]))
+        spinning = grip * np.abs(self._arms) * (p.l_f + p.l_r) * p.m / p.Jzz
+        change = dt * (grip + spinning + turning[..., np.newaxis])  # of a wheel's speed
+        w_x, w_y = self._wheel_velocities(x, _axles(u, 0))
+        along = np.maximum(np.abs(w_x) - change, self.v_eps)
+        across = np.maximum(np.abs(w_y) - change, 0.0)
+        slope = np.where(along >= across, along / (along**2 + across**2), 0.5 / np.maximum(across, self.v_eps))
+        stiffness = 2 * p.mu_scale * tyre.stiffness(_of(p.lateral), self._loads)
+        return np.asarray((stiffness * (1 / p.m + self._arms**2 / p.Jzz) * slope).sum(axis=-1))
 
     def kinetic_energy(self, x: FloatArray) -> FloatArray:
         """Kinetic energy in J of the states ``x`` (..., 3)."""
         return kinetic_energy(self.parameters, x)
 
-    def _axles(self, u: FloatArray) -> tuple[tuple[float, float, FloatArray, FloatArray], ...]:
-        """Front and rear: lever arm in m, static load of one wheel in N, steer and slip ratio."""
-        p = self.parameters
-        per_metre = p.m * G / (2 * (p.l_f + p.l_r))
-        return (
-            (p.l_f, per_metre * p.l_r, u[..., 0], u[..., 1]),
-            (-p.l_r, per_metre * p.l_f, u[..., 2], u[..., 3]),
-        )
+    @cached_property
+    def _arms(self) -> FloatArray:
+        """Lever arms of the front and the rear axle in m, (2,)."""
+        return np.array([self.parameters.l_f, -self.parameters.l_r])
 
-    def _wheel_velocity(self, x: FloatArray, arm: float, steer: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Velocity in m/s at the axle, in the frame of its wheels."""
-        v_x, v_y = x[..., 0], x[..., 1] + arm * x[..., 2]
+    @cached_property
+    def _loads(self) -> FloatArray:
+        """Static load of one wheel of the front and of the rear axle in N, (2,)."""
+        p = self.parameters
+        return np.array([p.l_r, p.l_f]) * p.m * G / (2 * (p.l_f + p.l_r))
+
+    def _wheel_velocities(self, x: FloatArray, steer: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Velocities in m/s at the axles in the frame of their wheels, along and across, (..., 2) each."""
+        v_x, v_y = x[..., :1], x[..., 1:2] + self._arms * x[..., 2:]
         if not np.any(steer):
             return v_x, v_y
         return np.cos(steer) * v_x + np.sin(steer) * v_y, np.cos(steer) * v_y - np.sin(steer) * v_x
 
-    def _axle_force(
-        self, x: FloatArray, arm: float, load: float, steer: FloatArray, slip_ratio: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Force of both wheels of an axle in N, in body axes."""
-        p = self.parameters
-        both = 2 * p.mu_scale
-        v_x, v_y = self._wheel_velocity(x, arm, steer)
-        F_x = (
-            both * tyre.force(_of(p.longitudinal), slip_ratio, load)
-            if np.any(slip_ratio)
-            else np.zeros_like(slip_ratio)
-        )
-        F_y = both * tyre.force(_of(p.lateral), tyre.slip_angle(v_x, v_y, self.v_eps), load)
-        if not np.any(steer):
-            return F_x, F_y
-        return np.cos(steer) * F_x - np.sin(steer) * F_y, np.sin(steer) * F_x + np.cos(steer) * F_y
+
+def _axles(u: FloatArray, which: int) -> FloatArray:
+    """Steer angle (0) or slip ratio (1) of the front and the rear axle, (..., 2)."""
+    return u[..., which::2]
 
 
 def _of(coefficients: MagicFormula | None) -> MagicFormula:

@@ -8,15 +8,15 @@ from koopcli.records import FloatArray
 from koopcli.vehicles.parameters import MagicFormula
 
 
-def force(tyre: MagicFormula, slip: FloatArray, load: float) -> FloatArray:
+def force(tyre: MagicFormula, slip: FloatArray, load: float | FloatArray) -> FloatArray:
     """Force in N at ``slip`` (rad for a slip angle, 1 for a slip ratio) under ``load`` in N (6.1); odd in the slip."""
     Bx = tyre.B * slip
     curved = Bx - tyre.E * (Bx - np.arctan(Bx))
     return np.asarray(tyre.mu * load * np.sin(tyre.C * np.arctan(curved)))
 
 
-def stiffness(tyre: MagicFormula, load: float) -> float:
-    """Slope of the force at zero slip, B C D in N per unit of slip."""
+def stiffness(tyre: MagicFormula, load: FloatArray) -> FloatArray:
+    """Slope of the force at zero slip, B C D in N per unit of slip, under ``load`` in N."""
     return tyre.B * tyre.C * tyre.mu * load
 
 

@@ -79,3 +79,59 @@ def test_dry_run_and_smoke(koop, folder):
     assert not (folder / "artefacts").exists()
     assert koop("reproduce", "edmd", "--smoke").code == 2  # with an experiment of its own
     assert (data_folder() / "experiments" / "smoke.toml").is_file()
+
+
+def test_the_eigenfunction_tables(koop, folder):
+    done = koop("reproduce", "eigen", "--json")
+    assert done.code == 0, done.err
+    (run,) = json.loads(done.out)["runs"]
+    assert run["method"] == "eigen"
+    cells = {(c["block"], c["label"], c["vehicle"], c["seed"]): c for c in run["evaluations"]}
+    assert len(cells) == len(run["evaluations"])
+    blocks = {block for block, *_ in cells}
+    assert blocks == {"headline", "readings", "cuts", "grip", "baselines"}
+    for vehicle in ("ctu-2020", "rimac-2018"):
+        assert ("headline", "as the experiment says", vehicle, 0) in cells
+        assert ("baselines", "DMD", vehicle, 0) in cells
+    text = (folder / json.loads(done.out)["path"]).read_text()
+    headline = cells["headline", "as the experiment says", "ctu-2020", 0]
+    assert f"{headline['rmse']['mean']:.4g} ± " in text
+    assert f"{headline['start_error']['mean']:.3g} %" in text
+    for part in ("23 ± 15 %", "rimac-2018", "cut 1e-08", "grip × 2", "optimal, cut 1e-10, D = 7800 N", "error-map"):
+        assert part in text.replace("RMSE by initial state", "error-map")
+    assert "not of the paper's size" in done.err
+
+
+def test_a_changed_eigenfunction_run_beside_the_plain_one(koop):
+    done = koop("reproduce", "eigen", "--set", "vehicle.mu_scale=2", "--json")
+    plain, changed = json.loads(done.out)["runs"]
+    assert changed["run"] == "vehicle.mu_scale=2"
+    assert "rimac-2018, vehicle.mu_scale=2" in done.err
+    doubled = {
+        c["label"]: c["rmse"] for c in plain["evaluations"] if c["block"] == "grip" and c["vehicle"] == "ctu-2020"
+    }
+    (headline,) = [
+        c["rmse"]
+        for c in changed["evaluations"]
+        if (c["block"], c["vehicle"], c["seed"]) == ("headline", "ctu-2020", 0)
+    ]
+    assert headline == doubled["grip × 2"]
+
+
+def test_both_methods_share_one_report_and_a_change_goes_where_it_belongs(koop, folder):
+    done = koop("reproduce", "--set", "vehicle.lateral.mu=1.5", "--json")
+    found = json.loads(done.out)
+    assert [(run["method"], run["run"]) for run in found["runs"]] == [
+        ("edmd", "here"),
+        ("eigen", "here"),
+        ("eigen", "vehicle.lateral.mu=1.5"),
+    ]
+    text = (folder / found["path"]).read_text()
+    assert text.index("# Paper versus here: EDMD") < text.index("# Paper versus here: eigenfunctions")
+    pictures = re.findall(r"\]\((all-[0-9a-f]+-\d+\.png)\)", text)
+    assert len(set(pictures)) == 1 + 2 * 2
+    for name in pictures:
+        assert (folder / "artefacts" / "reports" / name).is_file()
+    again = koop("reproduce", "--set", "vehicle.lateral.mu=1.5", "--json")
+    assert again.out == done.out
+    assert "made in" not in again.err

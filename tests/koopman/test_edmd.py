@@ -182,7 +182,9 @@ def test_inputs_that_determine_too_little_give_one_answer_by_either_path(columns
     assert pytest.approx(blocks.A, abs=1e-9) == product.A
     assert pytest.approx(blocks.B, abs=1e-9) == product.B
     assert product.predict(x0[:5], u[:5]) == pytest.approx(data.x[:5], abs=1e-9)
-    assert product.condition > 1e10
+    moving = np.ptp(columns, axis=0) > 0  # what never moves is no direction; what moves with another is one too many
+    assert product.directions == blocks.directions == 4 + moving.sum()
+    assert (product.condition > 1e10) == (product.rank < product.directions)
 
 
 def test_a_basis_from_many_rows_uses_a_spread_choice(monkeypatch, reduced):

@@ -6,7 +6,7 @@ import pytest
 from koopcli.vehicles.parameters import MagicFormula
 from koopcli.vehicles.tyre import force, slip_angle, stiffness
 
-LOAD = 3000.0
+LOAD = np.array(3000.0)
 
 
 @pytest.fixture(params=[(8.11, 1.3, 1.95, 0.2), (9.974, 1.28, 0.9689, -1.2446), (10.861, 1.63, 1.0709, 0.5215)])
