@@ -44,12 +44,13 @@ def setting(
     high: float | None = None,
     unit: str = "",
     unique: bool = False,
+    empty: bool = False,
 ) -> Any:
     """A dataclass field with its documentation and bounds: ``low <= value``, ``above < value``, ``value <= high``.
 
-    ``unique``: a list without repetition.
+    ``unique``: a list without repetition; ``empty``: a list that may have no entry.
     """
-    meta = {"help": help, "low": low, "above": above, "high": high, "unit": unit, "unique": unique}
+    meta = {"help": help, "low": low, "above": above, "high": high, "unit": unit, "unique": unique, "empty": empty}
     return field(metadata=meta) if default is MISSING else field(default=default, metadata=meta)
 
 
@@ -91,7 +92,8 @@ def coerce(  # noqa: PLR0911  (one return for each kind of type reads best)
         (inner,) = [k for k in get_args(kind) if k is not type(None)]
         return coerce(inner, value, name, bounds, origin)
     if get_origin(kind) is tuple:
-        if isinstance(value, str) or not isinstance(value, (list, tuple)) or not value:
+        listed = isinstance(value, (list, tuple)) and (len(value) > 0 or bounds.get("empty"))
+        if not listed or not isinstance(value, (list, tuple)):
             raise InvalidValueError(
                 origin.say(f"'{name}' must be a non-empty list such as [1, 2], got {_short(repr(value))}")
             )
@@ -142,7 +144,7 @@ def _short(text: str) -> str:
 def _within(value: Any, name: str, bounds: Mapping[str, Any], origin: Origin) -> None:
     if isinstance(value, str):
         return
-    unit = f" {bounds['unit']}" if bounds.get("unit") else ""
+    unit = f" {bounds['unit']}" if bounds.get("unit") not in (None, "", "1") else ""
     shown = f"{value:.6g}" if isinstance(value, float) else _short(str(value))
     if isinstance(value, float) and not math.isfinite(value):
         raise InvalidValueError(origin.say(f"'{name}' must be a finite number, got {shown}"))

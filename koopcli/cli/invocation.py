@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from koopcli.config.experiment import Changes, Experiment, flat, load_experiment, parse_set
-from koopcli.config.settings import UNUSED
+from koopcli.config.settings import OF_VEHICLE, UNUSED, FitEdmd, FitEigen
 from koopcli.console import Console, show_table
 from koopcli.errors import UnknownNameError, UsageError
 
@@ -93,18 +93,40 @@ def why_idle(name: str, experiment: Experiment, tasks: Sequence[Task]) -> str | 
     behind = [step for task in tasks for step in task.upstream()]
     if section in ("vehicle", "simulate"):
         plants = {step.settings.plant for step in behind if step.stage == "simulate"}
-        by_energy = any(hasattr(step.settings, key) or key == "name" for step in behind if step.stage == "sample")
+        by_energy = any(
+            key in (*OF_VEHICLE, "name") and hasattr(step.settings, OF_VEHICLE[0])
+            for step in behind
+            if step.stage == "sample"
+        )
         if not plants and not by_energy:
             return "only kinds of sample by kinetic energy depend on the vehicle, through its m and Jzz"
         unused = [plant for plant in plants if any(f"{name}.".startswith(f"{one}.") for one in UNUSED[plant])]
         if plants and len(unused) == len(plants):
             return f"the plant '{unused[0]}' has no use for it"
-    for fit, settings in (("fit-edmd", experiment.fit_edmd), ("fit-eigen", experiment.fit_eigen)):
-        settled = settings.settled()
-        if section == fit and getattr(settled, key) != getattr(settings, key):
-            chosen = "basis" if fit == "fit-edmd" else "boundary"
-            return f"{fit}.{chosen} '{getattr(settings, chosen)}' has no use for it"
+    if section in ("sample", "test") and "." in key:
+        kind, tested = key.partition(".")[0], _test_samples(behind)
+        relevant = tested if section == "test" else {one for one in _samples(behind) if one not in tested} or tested
+        if kind not in {one.settings.kind for one in relevant}:
+            return f"no {section} of kind '{kind}' is used"
+    fits: dict[str, tuple[FitEdmd | FitEigen, str]] = {
+        "fit-edmd": (experiment.fit_edmd, "basis"),
+        "fit-eigen": (experiment.fit_eigen, "boundary"),
+    }
+    if section in fits:
+        settings, chosen = fits[section]
+        if getattr(settings.settled(), key) != getattr(settings, key):
+            return f"{section}.{chosen} '{getattr(settings, chosen)}' has no use for it"
     return None
+
+
+def _samples(behind: Sequence[Task]) -> set[Task]:
+    return {step for step in behind if step.stage == "sample"}
+
+
+def _test_samples(behind: Sequence[Task]) -> set[Task]:
+    """The samples that evaluations among ``behind`` test on."""
+    tests = [dict(step.inputs).get("trajectories") for step in behind if step.stage == "evaluate"]
+    return {sample for test in tests if test is not None for sample in _samples(list(test.upstream()))}
 
 
 def open_store(store: Path | None) -> tuple[Console, Any]:

@@ -205,7 +205,7 @@ def _rows(value: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
         elif isinstance(entry, dict):
             yield from _rows(entry, f"{name}.")
         elif isinstance(entry, (list, tuple)):
-            yield name, " ".join(map(str, entry))
+            yield name, " ".join(f"{value:.6g}" if isinstance(value, float) else str(value) for value in entry)
         else:
             yield name, f"{entry:.6g}" if isinstance(entry, float) else str(entry)
 

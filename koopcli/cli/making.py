@@ -99,6 +99,8 @@ def sample(
 ) -> None:
     """Draw or lay out initial states and inputs.
 
+    Kinds by kinetic energy (ellipsoid, ball) take mass and yaw inertia from the vehicle; the others are of none.
+
     Example: koop sample ellipsoid --mesh fibonacci
     """
     given: Values = {
@@ -190,21 +192,26 @@ def fit_eigen(
         typer.Argument(autocompletion=complete_name, help="Trajectories; made from the settings when left out."),
     ] = None,
     degree: Annotated[
-        int | None, typer.Option(help=f"Most rates of the data in one sum: 1, 2, 3 give 4, 10, 20 ({FitEigen.degree}).")
+        int | None,
+        typer.Option(
+            help="Rates of growth are sums of up to this many of the data's three: 1, 2, 3 give 4, 10, 20 rates "
+            f"({FitEigen.degree})."
+        ),
     ] = None,
     boundary: Annotated[
         Boundary | None,
         typer.Option(
             metavar=names(Boundary),
-            help="Values of the eigenfunctions on Γ: thin-plate splines, or the best for the data "
-            f"({FitEigen.boundary}).",
+            help="Values of the eigenfunctions at the initial states: thin-plate splines of the state, as in the "
+            f"paper, or the best ones for each trajectory ({FitEigen.boundary}).",
         ),
     ] = None,
     centres: Annotated[int | None, typer.Option(help=f"thin-plate: number of splines ({FitEigen.centres}).")] = None,
     cut: Annotated[
         float | None,
         typer.Option(
-            help="Smallest singular value kept, relative to the largest (1e-14 for thin-plate, rounding for optimal)."
+            help="Smallest singular value kept, relative to the largest; the errors depend on it (1e-14 for "
+            "thin-plate, working precision for optimal)."
         ),
     ] = None,
     lift: Annotated[
@@ -213,7 +220,8 @@ def fit_eigen(
     tabulate: Annotated[
         float | None,
         typer.Option(
-            help=f"Seconds of each trajectory that are looked up; the rest is the horizon ({FitEigen.tabulate:g})."
+            help="Seconds of each trajectory in which a state is looked up; what is simulated beyond is the longest "
+            f"prediction ({FitEigen.tabulate:g})."
         ),
     ] = None,
     vehicle: VehicleOption = None,
@@ -223,7 +231,11 @@ def fit_eigen(
     dry_run: DryRunOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit a Koopman predictor whose lifted states are eigenfunctions, built from trajectories that start on a surface.
+    """Fit a Koopman predictor whose lifted states are eigenfunctions, built from trajectories without inputs.
+
+    The trajectories start on a surface Γ of one kinetic energy (kind ellipsoid) and never return to it. Along each of
+    them an eigenfunction grows as exp(rate · time) from its value on Γ; a new state takes the values of the nearest
+    sample. Inputs have no effect on the prediction.
 
     Example: koop fit-eigen --boundary optimal --cut 1e-10
     """

@@ -60,7 +60,7 @@ def plot(
     from koopcli.stages import recipes
 
     if artefacts:
-        evaluations = [call.named(name, ["evaluate"], f"the figure '{figure}'", ()) for name in artefacts]
+        evaluations = [call.named(name, ["evaluate"], f"what '{figure}' draws", ()) for name in artefacts]
     else:
         for name, _ in flat(call.changes):
             if FIGURES[figure].several and name in SWEPT:

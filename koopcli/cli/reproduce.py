@@ -13,7 +13,7 @@ import typer
 
 from koopcli.cli.invocation import Invocation, begin, print_json, show_plan
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption
-from koopcli.config.experiment import SECTIONS, Changes, Experiment, flat, load_experiment
+from koopcli.config.experiment import SECTIONS, Changes, Experiment, flat, load_experiment, nested
 from koopcli.console import show_table
 from koopcli.errors import UsageError
 
@@ -48,10 +48,12 @@ def reproduce(
     dry_run: DryRunOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Reproduce the paper at full size, beside its figures: every order of EDMD, every reading of eigenfunctions.
+    """Reproduce the paper at full size and put its figures beside those found here: EDMD over orders, training grids
+    and test inputs; eigenfunctions over readings of the text, two tyres, cuts, grip and baselines.
 
-    What --set changes is shown beside the unmodified run. The tables, the figures and the names of all artefacts
-    are written to a file, whose path is printed. All of it is pinned, with what it was made from.
+    Some two minutes and 300 MB for both. What --set changes is shown beside the unmodified run. The tables, the
+    figures and the names of all artefacts are written to a file, whose path is printed. All of it is pinned, with what
+    it was made from.
 
     Example: koop reproduce eigen --set vehicle.mu_scale=0.8
     """
@@ -101,13 +103,10 @@ def _refuse(changes: Changes, chosen: Sequence[Method]) -> None:
 def _experiments(call: Invocation, base: str, method: Method) -> list[tuple[str, Experiment]]:
     """The unmodified experiment, and the modified one beside it; a change of the sweep itself applies to both."""
     plan = {section: values for section, values in call.changes.items() if section == "reproduce"}
-    changed = [
-        f"{name}={value}"
-        for name, value in flat(call.changes)
-        if not name.startswith("reproduce.") and method.uses(name)
-    ]
+    used = [(name, value) for name, value in flat(call.changes) if method.uses(name)]
+    changed = [f"{name}={value}" for name, value in used if not name.startswith("reproduce.")]
     runs = [("here", load_experiment(base, plan))]
-    return [*runs, (" ".join(changed), call.experiment)] if changed else runs
+    return [*runs, (" ".join(changed), load_experiment(base, nested(used)))] if changed else runs
 
 
 def _finish(call: Invocation, name: str, parts: Sequence[_Part], *, as_json: bool) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -66,9 +66,14 @@ class Experiment:
         return Path(str(next((name for name in reversed(named) if name), DEFAULT_VEHICLE))).stem
 
     def with_vehicle(self, name: str) -> Experiment:
-        """The experiment with another vehicle, and with the parameters that the command line changes changed in it."""
+        """The experiment with a vehicle of ``reproduce.beside``, as its file has it but for what ``--set`` changes.
+
+        Parameters that an experiment file changes make its own vehicle and no other.
+        """
+        named = [layer for layer in self.layers if "beside" in layer.values.get("reproduce", {})]
+        folder = named[-1].folder if named else Path()
         changed = {key: v for key, v in self.layers[-1].values.get("vehicle", {}).items() if key != "name"}
-        return self._driving(change(vehicle_named(name, self.layers[0].folder), changed, COMMAND_LINE))
+        return self._driving(change(vehicle_named(name, folder), changed, COMMAND_LINE))
 
     def with_parameters(self, **changed: object) -> Experiment:
         """The experiment with single parameters of its vehicle replaced."""
@@ -144,7 +149,7 @@ def load_experiment(name: str, changes: Changes) -> Experiment:
 
 def parse_set(assignments: Sequence[str]) -> Changes:
     """``--set stage.key=value`` as changes; the value is TOML, or plain text where it is none."""
-    changes: Changes = {}
+    given = []
     for text in assignments:
         name, equals, raw = text.partition("=")
         section, *keys = name.strip().split(".")
@@ -152,12 +157,21 @@ def parse_set(assignments: Sequence[str]) -> Changes:
             raise UsageError(f"--set {text}: write --set stage.key=value, such as --set vehicle.Jzz=1731")
         if section not in SECTIONS:
             raise UsageError(f"--set {text}: unknown stage '{section}'{candidates(section, SECTIONS)}")
+        given.append((name.strip(), _toml_value(raw)))
+    return nested(given)
+
+
+def nested(named: Iterable[tuple[str, Any]]) -> Changes:
+    """Changes from full names such as ``vehicle.lateral.mu``: the inverse of :func:`flat`."""
+    changes: Changes = {}
+    for name, value in named:
+        section, *keys = name.split(".")
         table = changes.setdefault(section, {})
         for key in keys[:-1]:
             table = table.setdefault(key, {})
             if not isinstance(table, dict):
-                raise UsageError(f"--set {text}: '{key}' is given a value of its own as well")
-        table[keys[-1]] = _toml_value(raw)
+                raise UsageError(f"--set {name}: '{key}' is given a value of its own as well")
+        table[keys[-1]] = value
     return changes
 
 
@@ -254,8 +268,9 @@ def _check_owner(section: str, kind: str, given: Mapping[str, Any], origin: Orig
     for key in given:
         owners = [name for name, cls in SAMPLES.items() if key in {f.name for f in fields(cls)}]
         if owners and kind not in owners:
+            whose, what = " or ".join(f"'{owner}'" for owner in owners), section.partition(".")[0]
             raise origin.misnamed(
-                origin.say(f"'{section}.{key}' belongs to kind '{owners[0]}', this {section} is of kind '{kind}'")
+                origin.say(f"'{section}.{key}' belongs to kind {whose}, this {what} is of kind '{kind}'")
             )
 
 

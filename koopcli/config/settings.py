@@ -126,7 +126,7 @@ class EllipsoidSample(Sampled):
 
     kind: Literal["ellipsoid"] = "ellipsoid"
     mesh: Mesh = setting("sphere", help="points on the surface: latitudes × longitudes, or a spiral")
-    count: int = setting(441, low=4, high=1_000_000, help="number of states; a square for the mesh 'sphere'")
+    count: int = setting(441, low=10, high=1_000_000, help="number of states; a square for the mesh 'sphere'")
     energy: float = setting(ENERGY, above=0, high=LARGEST, unit="J", help="kinetic energy")
     steps: int = setting(150, low=1, high=1_000_000, help="steps of each trajectory")
     m: float
@@ -231,7 +231,7 @@ class FitEigen:
     seed: int = setting(0, low=0, high=SEED_LIMIT, help="thin-plate: seed of their centres")
     scaling: Scaling = setting("raw", help="thin-plate: distances in raw SI units, or in half-widths of the data")
     cut: float | None = setting(
-        None, low=0, high=1, help="smallest singular value kept, of the largest; else 1e-14 (thin-plate) or rounding"
+        None, low=0, high=0.5, help="smallest singular value kept, of the largest; else 1e-14 (thin-plate) or rounding"
     )
     tabulate: float = setting(1.0, above=0, high=1e6, unit="s", help="length of each trajectory that is looked up")
     lift: LiftName = setting("nearest", help="how a state is looked up")
@@ -289,9 +289,11 @@ class Reproduce:
     excitations: tuple[Excitation, ...] = setting(("none", "fresh", "held"), unique=True, help="edmd: test inputs")
     seeds: tuple[int, ...] = setting((0, 1, 2, 3), low=0, high=SEED_LIMIT, unique=True, help="eigen: test seeds")
     cuts: tuple[float, ...] = setting(
-        (1e-6, 1e-8, 1e-10, 1e-12, 1e-14), low=0, high=1, unique=True, help="eigen: cuts of the sensitivity table"
+        (1e-6, 1e-8, 1e-10, 1e-12, 1e-14), low=0, high=0.5, unique=True, help="eigen: cuts of the sensitivity table"
     )
     mu_scales: tuple[float, ...] = setting(
         (0.5, 2.0, 3.0), low=0, high=100, unique=True, help="eigen: factors on the grip of the sensitivity table"
     )
-    beside: tuple[str, ...] = setting(("rimac-2018",), unique=True, help="eigen: vehicles shown beside the main one")
+    beside: tuple[str, ...] = setting(
+        ("rimac-2018",), unique=True, empty=True, help="eigen: vehicles shown beside the main one"
+    )

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from koopcli.koopman.modes import IndexArray
 from koopcli.records import Array, BoolArray, FloatArray, Packed
 
 STATES_LIMIT = 1 << 16  # training states that are kept to measure distances from
+GOLDEN = (5**0.5 - 1) / 2
 ROUNDING = 1e-9  # of a half-width: a state on the hull is inside it
 
 
@@ -57,19 +60,52 @@ class Coverage:
         return cKDTree(_in_half_widths(self.states, self.domain))
 
 
-def coverage_of(states: FloatArray, domain: FloatArray) -> Coverage:
-    """The coverage of training ``states`` (m, n_x) with their ``domain`` (2, n_x).
+def coverage_of(blocks: Callable[[], Iterable[FloatArray]], total: int) -> Coverage:
+    """The coverage of the ``total`` training states that each call of ``blocks()`` yields as (rows, n_x).
 
-    States that lie in a plane have no hull; the box of the domain stands for it.
+    All of them shape the domain and the hull; ``STATES_LIMIT`` at most, spread evenly, are kept to measure distances
+    from. States that lie in a plane have no hull; the box of the domain stands for it.
     """
+    chosen, found, start = spread(total, STATES_LIMIT), [], 0
+    corners: FloatArray | None = None
+    for x in blocks():
+        first, last = np.searchsorted(chosen, [start, start + len(x)])
+        found.append(x[chosen[first:last] - start])
+        start += len(x)
+        corners = _corners(x if corners is None else np.concatenate([corners, x]))
+    assert corners is not None, "there is at least one block"
+    domain = np.stack([corners.min(axis=0), corners.max(axis=0)])
+    n_x = corners.shape[1]
+    hull = _hull(_in_half_widths(corners, domain))
+    box = np.hstack([np.vstack([np.eye(n_x), -np.eye(n_x)]), -np.ones((2 * n_x, 1))])
+    facets = box if hull is None else np.unique(hull.equations, axis=0)
+    return Coverage(np.concatenate(found), domain, facets)
+
+
+def spread(total: int, limit: int) -> IndexArray:
+    """At most ``limit`` of ``total`` rows, spread by multiples of the golden ratio, which no regular data can match."""
+    if total <= limit:
+        return np.arange(total)
+    return np.unique((np.arange(limit) * GOLDEN % 1.0 * total).astype(np.intp))
+
+
+def _corners(x: FloatArray) -> FloatArray:
+    """The states that the hull and the box of ``x`` hang on; all of them where there is no hull."""
+    hull = _hull(x)
+    if hull is None and len(x) <= STATES_LIMIT:
+        return x
+    vertices = np.empty(0, dtype=np.intp) if hull is None else hull.vertices
+    return np.asarray(x[np.unique(np.concatenate([vertices, x.argmin(axis=0), x.argmax(axis=0)]))])
+
+
+def _hull(x: FloatArray) -> Any:
     from scipy.spatial import ConvexHull, QhullError  # noqa: PLC0415
 
-    n_x = states.shape[1]
+    distinct = x if len(x) > 1 << 16 else np.unique(x, axis=0)
     try:
-        facets = np.unique(ConvexHull(_in_half_widths(states, domain)).equations, axis=0)
+        return ConvexHull(x) if len(distinct) > x.shape[1] else None
     except (QhullError, ValueError):
-        facets = np.hstack([np.vstack([np.eye(n_x), -np.eye(n_x)]), -np.ones((2 * n_x, 1))])
-    return Coverage(states, domain, facets)
+        return None
 
 
 def _in_half_widths(x: FloatArray, domain: FloatArray) -> FloatArray:

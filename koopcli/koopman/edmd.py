@@ -9,8 +9,7 @@ import numpy as np
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.bases import BASES, Basis
-from koopcli.koopman.coverage import STATES_LIMIT, Coverage, coverage_of
-from koopcli.koopman.modes import IndexArray
+from koopcli.koopman.coverage import Coverage, coverage_of, spread
 from koopcli.koopman.predictor import Predictor
 from koopcli.koopman.regression import condition_number, least_squares
 from koopcli.progress import Progress, silent
@@ -18,7 +17,7 @@ from koopcli.records import FloatArray, Trajectories
 
 BLOCK = 4096  # rows lifted together
 MARGINAL_ROWS = 1 << 18  # rows that may shape the basis; the regression always reads all of them
-GOLDEN = (5**0.5 - 1) / 2
+HULL_BLOCK = 1 << 15  # states whose hull is taken together
 
 
 class _Operators(NamedTuple):
@@ -46,16 +45,9 @@ def basis_from_data(trajectories: Trajectories, kind: str, order: int) -> Basis:
     return BASES[kind].make(nodes, order)
 
 
-def _spread(total: int, limit: int) -> IndexArray:
-    """At most ``limit`` of ``total`` rows, spread by multiples of the golden ratio, which no regular data can match."""
-    if total <= limit:
-        return np.arange(total)
-    return np.unique((np.arange(limit) * GOLDEN % 1.0 * total).astype(np.intp))
-
-
 def _spread_rows(trajectories: Trajectories, limit: int) -> FloatArray:
     """At most ``limit`` states that a step starts from."""
-    chosen = _spread(len(trajectories) * trajectories.steps, limit)
+    chosen = spread(len(trajectories) * trajectories.steps, limit)
     found, start = [], 0
     for x, _, _ in trajectories.transitions(BLOCK):
         first, last = np.searchsorted(chosen, [start, start + len(x)])
@@ -200,12 +192,9 @@ def _factors(trajectories: Trajectories, product: tuple[int, int]) -> tuple[Floa
 
 
 def coverage(trajectories: Trajectories) -> Coverage:
-    """Where the states lie that steps start from."""
-    extremes = [(x.min(axis=0), x.max(axis=0)) for x, _, _ in trajectories.transitions(BLOCK)]
-    lower, upper = zip(*extremes, strict=True)
+    """Where the states lie that steps start from; those of a product count once."""
     if trajectories.factors is not None:
         x = _factors(trajectories, trajectories.factors)[1]
-        x = x[_spread(len(x), STATES_LIMIT)]
-    else:
-        x = _spread_rows(trajectories, STATES_LIMIT)
-    return coverage_of(x, np.stack([np.min(lower, axis=0), np.max(upper, axis=0)]))
+        return coverage_of(lambda: [x], len(x))
+    total = len(trajectories) * trajectories.steps
+    return coverage_of(lambda: (x for x, _, _ in trajectories.transitions(HULL_BLOCK)), total)

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.coverage import STATES_LIMIT, coverage_of
+from koopcli.koopman.coverage import coverage_of
 from koopcli.koopman.modes import ComplexArray, Modes, exponentials, newton_couplings
 from koopcli.koopman.predictor import Predictor
 from koopcli.koopman.tabulated import Nearest
@@ -44,26 +44,24 @@ def fit(
     rates = lattice(dmd_rates(x, dt), degree)
     check_growth(rates, trajectories.steps * dt)
     cut = np.finfo(float).eps * x.shape[1] if cut is None else cut
-    domain = np.stack([x.min(axis=(0, 1)), x.max(axis=(0, 1))])
     window = trajectories.steps * dt
     block = Modes(rates, newton_couplings(rates, window), 1, dt)
     if boundary == "thin-plate":
-        half = (domain[1] - domain[0]) / 2
+        half = np.ptp(x, axis=(0, 1)) / 2
         scale = np.where(half > 0, half, 1.0) if scaling == "extent" else np.ones(x.shape[2])
         solution = fit_given(x, thin_plate(x[:, 0], draw_centres(x, centres, seed), scale), block, cut)
     else:
         solution = fit_free(x, block, cut)
     modes = replace(block, copies=solution.starts.shape[1])
     table = x[:, : tabulated + 1]
-    spread = table.reshape(-1, x.shape[2])
-    spread = spread[:: max(1, math.ceil(len(spread) / STATES_LIMIT))]
+    states = table.reshape(-1, x.shape[2])
     return Predictor(
         observables=Nearest(table, solution.starts, modes),
         A=modes,
         B=np.zeros((len(modes), len(trajectories.input_channels))),
         C=solution.C,
         dt=dt,
-        coverage=coverage_of(spread, domain),
+        coverage=coverage_of(lambda: [states], len(states)),
         state_channels=trajectories.state_channels,
         input_channels=trajectories.input_channels,
         rank=solution.rank,
@@ -101,9 +99,9 @@ def autonomous(trajectories: Trajectories) -> FloatArray:
         if (u != acting).any():
             j = start + int(np.argmax((u != acting).any(axis=(1, 2))))
             raise InvalidValueError(
-                f"the inputs of these trajectories change (trajectory {j}): an eigenfunction e^(λt) g(x0) belongs to a "
-                "system that runs by itself; give trajectories without inputs, such as those of kind 'ellipsoid', "
-                "or fit with fit-edmd"
+                f"the inputs of these trajectories change or differ (trajectory {j}): an eigenfunction e^(λt) g(x0) "
+                "belongs to a system that runs by itself; give trajectories without inputs, such as those of kind "
+                "'ellipsoid', or fit with fit-edmd"
             )
     x = np.asarray(trajectories.x[:])
     if not np.isfinite(x).all():
@@ -124,7 +122,7 @@ def dmd_rates(x: FloatArray, dt: float) -> ComplexArray:
         if value.imag == 0 and value.real <= 0:
             raise InvalidValueError(
                 f"the best linear map of these trajectories has the eigenvalue {value.real:.3g}, which no continuous "
-                "rate has: sample faster (a smaller simulate.dt), or give trajectories that move in every state"
+                "rate has: give trajectories that move in every state, or sample faster (a smaller simulate.dt)"
             )
     return np.asarray(np.log(eigenvalues) / dt)
 
@@ -205,8 +203,9 @@ def _coordinates(basis: FloatArray, values: FloatArray) -> FloatArray:
 
 def thin_plate(x: FloatArray, centres: FloatArray, scale: FloatArray) -> FloatArray:
     """g(x) = r² log r with r the distance in ``scale``d coordinates (7.5), 0 at 0: (n, centres)."""
-    squared = ((x[:, np.newaxis] - centres) / scale) ** 2
-    r2 = squared.sum(axis=2)
+    r2 = np.zeros((len(x), len(centres)))
+    for i in range(x.shape[1]):
+        r2 += ((x[:, i, np.newaxis] - centres[:, i]) / scale[i]) ** 2
     return np.asarray(0.5 * r2 * np.log(np.where(r2 > 0, r2, 1.0)))
 
 

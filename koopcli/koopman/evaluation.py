@@ -152,9 +152,9 @@ def evaluate(predictor: Forecaster, trajectories: Trajectories, rows: slice, fir
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging prediction is a result, not an accident
         once = predictor.predict(x[:, 0], u)
         relift = np.empty_like(once)
-        relift[:, 0] = once[:, 0]
+        relift[:, 0], at = once[:, 0], x[:, 0]  # the first step starts from the state that is known
         for k in range(trajectories.steps):
-            relift[:, k + 1] = predictor.step(relift[:, k], u[:, k])
+            relift[:, k + 1] = at = predictor.step(at, u[:, k])
         scored = slice(first, None)
         return Evaluation(
             x0=x[:, 0],

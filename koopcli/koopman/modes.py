@@ -57,6 +57,11 @@ class Modes:
 
         return np.asarray(expm(self.generator * self.dt))
 
+    def __matmul__(self, z: FloatArray) -> FloatArray:
+        """A times ``z`` (N,) or (N, m)."""
+        blocks = z.reshape(self.copies, len(self.rates), -1)
+        return np.asarray(self.block @ blocks).reshape(z.shape)
+
     def __rmatmul__(self, rows: FloatArray) -> FloatArray:
         """``rows`` (..., N) times A."""
         blocks = rows.reshape(*rows.shape[:-1], self.copies, len(self.rates))

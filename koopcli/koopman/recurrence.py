@@ -13,10 +13,15 @@ from koopcli.records import FloatArray
 ONE_LEVEL = 1e-6  # relative spread of the energies of states that count as one level
 TOUCH = 1e-3  # of the distance between two samples: a start nearer to the path than that lies on it
 NEAR = 0.1  # of the same: a start nearer to the straight way than that is looked at closely
+TINY = 1e-300
 REST = 1e-12  # of the largest state: a trajectory that moves less is at rest
 
-Energy = Callable[[FloatArray], FloatArray]
-Flow = Callable[[FloatArray], FloatArray]
+
+class Surface(NamedTuple):
+    """What a plant knows of a surface of one kinetic energy: ``energy(x)`` (n,) in J, ``flow(x)`` = dx/dt (n, n_x)."""
+
+    energy: Callable[[FloatArray], FloatArray]
+    flow: Callable[[FloatArray], FloatArray]
 
 
 class _Return(NamedTuple):
@@ -42,16 +47,18 @@ def check_starts(x: FloatArray) -> int:
     return int((like != np.arange(len(x))).sum())
 
 
-def check_recurrence(x: FloatArray, dt: float, energy: Energy | None = None, flow: Flow | None = None) -> None:
+def check_recurrence(x: FloatArray, dt: float, surface: Surface | None = None) -> bool:
     """Raise ``InvalidValueError`` where trajectories ``x`` (J, samples, n_x) come back to their initial states (7.9).
 
-    With the kinetic ``energy`` and the ``flow`` dx/dt of the plant: initial states of one energy are a closed surface
-    that every trajectory must leave at once and stay inside of. In any case no path may lead through an initial state.
+    Initial states of one energy are a closed ``surface`` that every trajectory must leave at once and stay inside of;
+    whether that could be checked is returned. In any case no path may lead through an initial state.
     """
-    if energy is not None and flow is not None:
-        level = energy(x[:, 0])
-        if np.ptp(level) <= ONE_LEVEL * level.max():
-            _stay_below(x, dt, energy, flow)
+    one_level = False
+    if surface is not None:
+        level = surface.energy(x[:, 0])
+        one_level = bool(np.ptp(level) <= ONE_LEVEL * level.max())
+        if one_level:
+            _stay_below(x, dt, surface)
     found = _passes_a_start(x)
     if found is not None:
         raise InvalidValueError(
@@ -59,18 +66,17 @@ def check_recurrence(x: FloatArray, dt: float, energy: Energy | None = None, flo
             f"{found.start}, {_text(x[found.start, 0])}: eigenfunctions need initial states that no trajectory returns "
             "to; shorten the trajectories or choose other initial states"
         )
+    return one_level
 
 
-def _stay_below(x: FloatArray, dt: float, energy: Energy, flow: Flow) -> None:
+def _stay_below(x: FloatArray, dt: float, surface: Surface) -> None:
     """Refuse a trajectory that keeps its energy at the start, or has it back later."""
-    start, epsilon = x[:, 0], 1e-6
-    size = np.abs(start).max()
-    step = epsilon * size / max(float(np.abs(flow(start)).max()), 1e-300)
-    ahead, behind = energy(start + step * flow(start)), energy(start - step * flow(start))
-    level = energy(start)
-    power = (ahead - behind) / (2 * step) / level
-    held = power > -1e-9 / max(x.shape[1] * dt, 1e-300)
-    again = energy(x[:, 1:]) >= level[:, np.newaxis]
+    start = x[:, 0]
+    level, flow = surface.energy(start), surface.flow(start)
+    step = 1e-6 * np.abs(start).max() / max(float(np.abs(flow).max()), TINY)
+    power = (surface.energy(start + step * flow) - surface.energy(start - step * flow)) / (2 * step) / level
+    held = power > -1e-9 / max(x.shape[1] * dt, TINY)
+    again = surface.energy(x[:, 1:]) >= level[:, np.newaxis]
     late = np.asarray(again.any(axis=1))
     if held.any() or late.any():
         j = int(np.argmax(held | late))
@@ -90,27 +96,25 @@ def _passes_a_start(x: FloatArray) -> _Return | None:
     scale = np.abs(x).max(axis=(0, 1))
     path = x / np.where(scale > 0, scale, 1.0)
     path = np.concatenate([path, path[:, -1:]], axis=1)  # the last sample is a stretch of no length
-    starts = path[:, 0]
-    nearest = cKDTree(starts).query(path.reshape(-1, path.shape[2]))[1].reshape(path.shape[:2])
-    found: list[_Return] = []
-    for end in (0, 1):  # the start nearest to either end of a stretch
-        candidate = nearest[:, 1 + end : path.shape[1] - 1 + end]
-        miss, length = _miss(path[:, 1:-1], path[:, 2:], starts[candidate])
-        for j, k in np.argwhere(miss <= np.maximum(NEAR * length, REST)):
-            fine = _curve(path[j], k + 1)
-            miss_there, _ = _miss(fine[:-1], fine[1:], starts[candidate[j, k]])
-            if miss_there.min() <= max(TOUCH * length[j, k], REST):
-                found.append(_Return(int(j), int(k) + 1, int(candidate[j, k])))
-                break
-    return min(found, default=None)
+    starts = cKDTree(path[:, 0])
+    middle = (path[:, 1:-1] + path[:, 2:]) / 2
+    length = np.linalg.norm(path[:, 2:] - path[:, 1:-1], axis=2)
+    reach = np.maximum((0.5 + NEAR) * length, REST)
+    distance, _ = starts.query(middle.reshape(-1, x.shape[2]))
+    for j, k in np.argwhere(distance.reshape(length.shape) <= reach):  # few: starts lie apart from the paths
+        fine = _curve(path[j], int(k) + 1)
+        for start in sorted(starts.query_ball_point(middle[j, k], reach[j, k])):
+            if _miss(fine[:-1], fine[1:], path[start, 0]).min() <= max(TOUCH * length[j, k], REST):
+                return _Return(int(j), int(k) + 1, int(start))
+    return None
 
 
-def _miss(start: FloatArray, stop: FloatArray, goal: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How far the straight way from ``start`` to ``stop`` (..., n_x) passes ``goal``, and how long it is, (...,)."""
+def _miss(start: FloatArray, stop: FloatArray, goal: FloatArray) -> FloatArray:
+    """How far the straight way from ``start`` to ``stop`` (..., n_x) passes ``goal``, (...,)."""
     along, way = stop - start, goal - start
     length = np.linalg.norm(along, axis=-1)
     share = np.clip((way * along).sum(axis=-1) / np.where(length > 0, length, 1.0) ** 2, 0.0, 1.0)
-    return np.linalg.norm(share[..., np.newaxis] * along - way, axis=-1), length
+    return np.asarray(np.linalg.norm(share[..., np.newaxis] * along - way, axis=-1))
 
 
 def _curve(path: FloatArray, k: int) -> FloatArray:

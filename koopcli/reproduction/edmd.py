@@ -41,6 +41,8 @@ class Cell:
 def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
     """Every cell of the experiment with its evaluation."""
     plan, grid = experiment.reproduce, _grid(experiment)
+    if experiment.fit_edmd.basis == "states":
+        raise InvalidValueError("reproduce edmd sweeps orders, which the basis 'states' has none of: leave it out")
     for draw in plan.draws:
         training = recipes.simulation(experiment, recipes.sample(replace(grid, draw=draw)))
         for order in plan.orders:

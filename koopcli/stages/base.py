@@ -105,10 +105,14 @@ class Task:
 
 @dataclass(frozen=True)
 class Prospect:
-    """What is known of a predictor before it is made: its lifted states, and the steps it may be asked for."""
+    """What is known of a predictor before it is made: its lifted states, the steps it may be asked for, and what a
+    figure calls it, with the order that it may be drawn against.
+    """
 
     functions: int
-    horizon: int | None = None
+    horizon: int | None
+    label: str
+    order: int | None = None
 
 
 @dataclass(frozen=True)

@@ -25,5 +25,5 @@ STAGE = Stage(
     describe=lambda f: f"{f['kind']}, fits nothing",
     check=lambda task: None,
     estimate=lambda task: Cost(0.1, 2e6),
-    predicts=lambda task: Prospect(functions=0),
+    predicts=lambda task: Prospect(0, None, f"baseline {task.settings.kind}"),
 )

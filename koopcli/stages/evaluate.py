@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from koopcli.checks import build
@@ -10,8 +12,8 @@ from koopcli.errors import InvalidValueError
 from koopcli.koopman.evaluation import Evaluation, evaluate, join
 from koopcli.koopman.predictor import check_horizon
 from koopcli.records import Meta, Packed
-from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task, refuse_beyond_memory
-from koopcli.stages.makers import MAKERS
+from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
+from koopcli.stages.makers import prospect
 from koopcli.vehicles.plants import PLANTS
 
 
@@ -35,13 +37,26 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
         if figures[name]:
             context.warn(f"{figures[name]} of {n} {what}; they are left out of the figures")
     if not predictor.knows_inputs and np.asarray(trajectories.u[: settings.chunk]).any():
-        context.warn("the test trajectories have inputs, of which this predictor knows nothing: B is zero")
+        context.warn("the test trajectories have inputs, of which this predictor knows nothing")
+    if other := _differing(predictor.plant, trajectories.plant):
+        context.warn(f"the test trajectories are of another vehicle or plant than the predictor: {', '.join(other)}")
     if figures["outside"]:
         context.warn(
-            f"{figures['outside']} of {n} test states lie outside the data (the convex hull of the training states); "
-            "expect little of predictions there"
+            f"{figures['outside']} of {n} test states lie outside the data, the convex hull of the training states: "
+            "predictions from there are extrapolation"
         )
     return result
+
+
+def _differing(one: Meta, other: Meta) -> list[str]:
+    """What differs between two plants, by name."""
+    if not one or not other:
+        return []
+    return sorted(name for name in {**one["vehicle"], **one, **other} if _at(one, name) != _at(other, name))
+
+
+def _at(plant: Meta, name: str) -> Any:
+    return None if name == "vehicle" else plant.get(name, plant["vehicle"].get(name))
 
 
 def _describe(figures: Meta) -> str:
@@ -53,14 +68,6 @@ def _describe(figures: Meta) -> str:
     )
 
 
-def _prospect(task: Task) -> Prospect:
-    """What is known of the predictor beforehand."""
-    predictor = task.input("predictor")
-    predicts = MAKERS[predictor.stage].predicts
-    assert predicts is not None
-    return predicts(predictor)
-
-
 def _check(task: Task) -> None:
     trained, tested = task.input("predictor").find("simulate"), task.input("trajectories").settings.plant
     if trained is not None and PLANTS[trained.settings.plant].inputs != PLANTS[tested].inputs:
@@ -69,19 +76,20 @@ def _check(task: Task) -> None:
             "they have different states or inputs"
         )
     steps = task.input("trajectories").settings.steps
-    check_horizon(steps, _prospect(task).horizon)
+    check_horizon(steps, prospect(task.input("predictor")).horizon)
     if task.settings.first > steps:
         raise InvalidValueError(f"'evaluate.first' must be at most the {steps} steps of the test set")
     test = task.input("trajectories").find("sample")
     rows = min(task.settings.chunk, test.settings.trajectories) if test is not None else task.settings.chunk
-    refuse_beyond_memory("a chunk", 24.0 * rows * _prospect(task).functions, "evaluate.chunk")
+    refuse_beyond_memory("a chunk", 24.0 * rows * prospect(task.input("predictor")).functions, "evaluate.chunk")
 
 
 def _estimate(task: Task) -> Cost:
     test = task.input("trajectories")
     samples = test.ancestor("sample").settings.trajectories * test.settings.steps
     return Cost(
-        6e-9 * samples * (_prospect(task).functions + 100), 130.0 * test.ancestor("sample").settings.trajectories
+        6e-9 * samples * (prospect(task.input("predictor")).functions + 100),
+        130.0 * test.ancestor("sample").settings.trajectories,
     )
 
 

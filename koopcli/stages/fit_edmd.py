@@ -8,8 +8,9 @@ from koopcli.errors import InvalidValueError
 from koopcli.koopman import edmd
 from koopcli.koopman.bases import BASES
 from koopcli.koopman.predictor import Predictor
-from koopcli.records import Meta, Trajectories
+from koopcli.records import Trajectories
 from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task
+from koopcli.stages.predictors import describe, figures
 from koopcli.store.files import size_text
 from koopcli.vehicles.plants import PLANTS
 
@@ -33,26 +34,6 @@ def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
     return predictor
 
 
-def figures(predictor: Predictor) -> Meta:
-    """What is told of a predictor of whichever method."""
-    return {
-        "functions": predictor.functions,
-        "rank": predictor.rank,
-        "directions": predictor.directions,
-        "condition": predictor.condition,
-        "spectral_radius": predictor.spectral_radius,
-        "horizon": predictor.horizon,
-    }
-
-
-def describe(figures: Meta) -> str:
-    """The same in a few words."""
-    return (
-        f"{figures['functions']} functions, rank {figures['rank']} of {figures['directions']}, "
-        f"condition {figures['condition']:.2g}, spectral radius {figures['spectral_radius']:.6f}"
-    )
-
-
 def _functions(task: Task) -> int:
     return BASES[task.settings.basis].count(task.settings.order, len(PLANTS[_plant(task)].states))
 
@@ -60,6 +41,15 @@ def _functions(task: Task) -> int:
 def _plant(task: Task) -> str:
     simulation = task.find("simulate")
     return simulation.settings.plant if simulation is not None else "forces"
+
+
+def _prospect(task: Task) -> Prospect:
+    settings, sample = task.settings, task.find("sample")
+    about = "other data"
+    if sample is not None:
+        drawn = sample.settings
+        about = f"{drawn.draw} {drawn.seed}" if isinstance(drawn, GridSample) else drawn.kind
+    return Prospect(_functions(task), None, about, settings.order if settings.basis != "states" else None)
 
 
 def _check(task: Task) -> None:
@@ -98,5 +88,5 @@ STAGE = Stage(
     describe=describe,
     check=_check,
     estimate=_estimate,
-    predicts=lambda task: Prospect(_functions(task)),
+    predicts=_prospect,
 )

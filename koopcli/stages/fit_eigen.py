@@ -8,11 +8,12 @@ from koopcli.checks import build
 from koopcli.config.settings import BoxSample, FitEigen, GridSample, SampleSettings
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import eigenfunctions
+from koopcli.koopman.modes import Modes
 from koopcli.koopman.predictor import Predictor
-from koopcli.koopman.recurrence import check_recurrence, check_starts
-from koopcli.records import FloatArray, Trajectories
+from koopcli.koopman.recurrence import Surface, check_recurrence, check_starts
+from koopcli.records import FloatArray, Meta, Trajectories
 from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task, refuse_beyond_memory
-from koopcli.stages.fit_edmd import describe, figures
+from koopcli.stages.predictors import describe, figures
 from koopcli.vehicles.plants import PLANTS, remembered_plant
 
 
@@ -32,12 +33,20 @@ def _run(settings: FitEigen, inputs: Inputs, context: Context) -> Predictor:
         cut=settings.cut,
         tabulated=_tabulated(settings, trajectories.dt),
     )
-    if predictor.rank < predictor.directions:
-        context.warn(
-            f"the cut keeps {predictor.rank} of {predictor.directions} directions (condition "
-            f"{predictor.condition:.1e}), and the errors depend on it: compare with another --cut"
-        )
     return predictor
+
+
+def _figures(predictor: Predictor) -> Meta:
+    modes = predictor.A
+    assert isinstance(modes, Modes)
+    return {**figures(predictor), "rates": modes.rates.real.tolist(), "frequencies": modes.rates.imag.tolist()}
+
+
+def _describe(figures: Meta) -> str:
+    found = describe(figures)
+    if figures["rank"] < figures["directions"]:
+        found += f"; the errors depend on the cut, which keeps {figures['rank']} directions"
+    return found
 
 
 def _check_surface(x: FloatArray, trajectories: Trajectories, context: Context) -> None:
@@ -47,13 +56,15 @@ def _check_surface(x: FloatArray, trajectories: Trajectories, context: Context) 
         context.warn(
             f"{repeated} of {len(x)} initial states are repeated; they are kept and count as often as they come"
         )
-    if not trajectories.plant:
-        check_recurrence(x, trajectories.dt)
-        return
-    plant, u = remembered_plant(trajectories.plant), np.asarray(trajectories.u[0])[:1]
-    check_recurrence(
-        x, trajectories.dt, plant.kinetic_energy, lambda states: plant.rhs(states, np.repeat(u, len(states), axis=0))
-    )
+    surface = None
+    if trajectories.plant:
+        plant, u = remembered_plant(trajectories.plant), np.asarray(trajectories.u[0])[:1]
+        surface = Surface(plant.kinetic_energy, lambda states: plant.rhs(states, np.repeat(u, len(states), axis=0)))
+    if not check_recurrence(x, trajectories.dt, surface):
+        context.warn(
+            "the initial states are no surface of one kinetic energy, so that trajectories may lead through it again "
+            "was only checked at these states themselves"
+        )
 
 
 def _tabulated(settings: FitEigen, dt: float) -> int:
@@ -80,7 +91,10 @@ def _check(task: Task) -> None:
     n_x = len(PLANTS[plant.plant].states)
     eigenfunctions.check_window(steps, _tabulated(task.settings, plant.dt), plant.dt)
     eigenfunctions.check_modes(eigenfunctions.lattice_size(n_x, task.settings.degree), steps)
-    refuse_beyond_memory("the fit", 3 * _estimate(task).bytes, "fit-eigen.centres or fit-eigen.degree")
+    if sample is not None:
+        splines = 32.0 * sample.settings.trajectories * task.settings.centres  # distances, splines, and their factors
+        needed = splines if task.settings.boundary == "thin-plate" else 0.0
+        refuse_beyond_memory("the fit", needed + 3 * _estimate(task).bytes, "fit-eigen.centres or sample.count")
 
 
 def _driven(sample: SampleSettings) -> bool:
@@ -93,22 +107,25 @@ def _driven(sample: SampleSettings) -> bool:
 def _prospect(task: Task) -> Prospect:
     simulation, sample = task.find("simulate"), task.find("sample")
     n_x = len(PLANTS[simulation.settings.plant].states) if simulation is not None else 3
-    copies = n_x
+    copies, about = n_x, f"eigenfunctions, {task.settings.boundary}"
     if task.settings.boundary == "thin-plate":
         starts = sample.settings.trajectories if sample is not None else task.settings.centres
         copies = min(starts, task.settings.centres)
     horizon = None
     if simulation is not None:
-        horizon = simulation.settings.steps - _tabulated(task.settings, simulation.settings.dt)
-    return Prospect(copies * eigenfunctions.lattice_size(n_x, task.settings.degree), horizon)
+        steps, tabulated = simulation.settings.steps, _tabulated(task.settings, simulation.settings.dt)
+        eigenfunctions.check_window(steps, tabulated, simulation.settings.dt)
+        horizon = steps - tabulated
+    return Prospect(copies * eigenfunctions.lattice_size(n_x, task.settings.degree), horizon, about)
 
 
 def _estimate(task: Task) -> Cost:
     simulation, sample = task.ancestor("simulate").settings, task.ancestor("sample").settings
-    J, steps, functions = sample.trajectories, simulation.steps, _prospect(task).functions
-    copies = min(J, task.settings.centres) if task.settings.boundary == "thin-plate" else functions
+    J, functions = sample.trajectories, _prospect(task).functions
+    wide = task.settings.centres if task.settings.boundary == "thin-plate" else 1
     table = 3 * J * (1 + round(task.settings.tabulate / simulation.dt))
-    return Cost(0.3 + 5e-9 * J * copies**2 + 1e-9 * J * steps * copies, 8.0 * (2 * table + J * copies + 7 * functions))
+    seconds = 0.3 + 2e-9 * J * wide * min(J, wide) + 1e-9 * J * simulation.steps * min(J, wide)
+    return Cost(seconds, 8.0 * (2 * table + J * min(J, wide) + 7 * functions))
 
 
 STAGE = Stage(
@@ -117,8 +134,8 @@ STAGE = Stage(
     settings=lambda values: build(FitEigen, values),
     run=_run,
     unpack=Predictor.unpack,
-    figures=figures,
-    describe=describe,
+    figures=_figures,
+    describe=_describe,
     check=_check,
     estimate=_estimate,
     predicts=_prospect,

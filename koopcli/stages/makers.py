@@ -3,6 +3,13 @@
 from __future__ import annotations
 
 from koopcli.stages import baseline, fit_edmd, fit_eigen
-from koopcli.stages.base import Stage
+from koopcli.stages.base import Prospect, Stage, Task
 
 MAKERS: dict[str, Stage] = {module.STAGE.name: module.STAGE for module in (fit_edmd, fit_eigen, baseline)}
+
+
+def prospect(predictor: Task) -> Prospect:
+    """What is known of a predictor before it is made."""
+    predicts = MAKERS[predictor.stage].predicts
+    assert predicts is not None
+    return predicts(predictor)

@@ -12,7 +12,6 @@ from koopcli.config.settings import (
     INPUTS,
     SAMPLED_FOR,
     BoxSample,
-    GridSample,
     ImageFormat,
     Plot,
     SampleSettings,
@@ -24,7 +23,7 @@ from koopcli.figures import source_digest
 from koopcli.figures.registry import FIGURES
 from koopcli.records import Meta
 from koopcli.stages.base import Task
-from koopcli.stages.makers import MAKERS
+from koopcli.stages.makers import MAKERS, prospect
 
 FITS = tuple(MAKERS)
 
@@ -139,11 +138,6 @@ def _behind(evaluation: Task, role: str) -> Task:
 
 
 def _series(evaluation: Task) -> Series:
-    predictor, test = evaluation.input("predictor"), evaluation.input("trajectories").ancestor("sample").settings
-    if predictor.stage != "fit-edmd":
-        about = "baseline " if predictor.stage == "baseline" else "eigenfunctions, "
-        return Series(about + getattr(predictor.settings, "boundary", getattr(predictor.settings, "kind", "")), None)
-    training = predictor.ancestor("sample").settings
-    draw = f"{training.draw} {training.seed}" if isinstance(training, GridSample) else training.kind
+    about, test = prospect(evaluation.input("predictor")), evaluation.input("trajectories").ancestor("sample").settings
     inputs = INPUTS[test.excitation] if isinstance(test, BoxSample) else test.kind
-    return Series(f"{draw}, {inputs}", predictor.settings.order)
+    return Series(f"{about.label}, {inputs}", about.order)

@@ -83,6 +83,32 @@ def test_a_horizon_past_the_window_names_the_longest_allowed(koop, folder):
     one_line(koop("evaluate", predictor, "--on", test), 3, "may be asked for 10 at most")
 
 
+def test_a_table_longer_than_the_data_is_said_as_such(koop, folder):
+    one_line(koop("plot", "error-map", "--set", "simulate.steps=15"), 3, "'fit-eigen.tabulate' of 0.2 s leaves nothing")
+    assert not (folder / "artefacts").exists()
+
+
+def test_initial_states_of_several_energies_are_said(koop):
+    sample = koop("sample", "ellipsoid").name
+    data = koop("simulate", sample, "--set", "vehicle.Jzz=3000").name
+    assert "no surface of one kinetic energy" in koop("fit-eigen", data).err
+    assert "no surface" not in koop("fit-eigen").err
+
+
+def test_another_vehicle_than_the_predictors_is_said(koop):
+    test = koop("simulate", koop("sample", "ball").name, "--vehicle", "rimac-2018", "--steps", "5").name
+    done = koop("evaluate", koop("fit-eigen").name, "--on", test)
+    assert "are of another vehicle or plant than the predictor: lateral, longitudinal" in done.err
+
+
+def test_the_rates_are_shown(koop):
+    made = figures(koop("fit-eigen", "--degree", "1", "--json"))
+    assert len(made["rates"]) == 4
+    assert max(made["rates"]) == 0
+    assert made["frequencies"] == [0, 0, 0, 0]
+    assert "rates" in koop("show", made["name"]).out
+
+
 def test_the_horizon_is_checked_before_anything_is_made(koop, folder):
     args = ["plot", "error-map", "--set", "test.ball.steps=11"]
     one_line(koop(*args), 3, "may be asked for 10 at most")
@@ -108,7 +134,7 @@ def test_repeated_initial_states_are_said(koop):
 
 
 def test_the_cut_is_said(koop):
-    assert "the cut keeps" in koop("fit-eigen", "--cut", "1e-4").err
+    assert "the errors depend on the cut, which keeps 26 directions" in koop("fit-eigen", "--cut", "1e-4").err
     kept = figures(koop("fit-eigen", "--boundary", "optimal", "--cut", "1e-6", "--json"))
     assert kept["rank"] < kept["directions"] == 10
 

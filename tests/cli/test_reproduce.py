@@ -135,3 +135,47 @@ def test_both_methods_share_one_report_and_a_change_goes_where_it_belongs(koop, 
     again = koop("reproduce", "--set", "vehicle.lateral.mu=1.5", "--json")
     assert again.out == done.out
     assert "made in" not in again.err
+
+
+def cells(done, block):
+    (run,) = [run for run in json.loads(done.out)["runs"] if run["run"] == "here"]
+    return {(c["label"], c["vehicle"]): c["rmse"]["mean"] for c in run["evaluations"] if c["block"] == block}
+
+
+def test_vehicles_keep_apart_whatever_they_are_called(koop, folder):
+    """One that is changed in the file beside its namesake as shipped; one file under another path only once."""
+    text = (folder.parent / "tiny.toml").read_text().replace("seeds = [0, 1]", "seeds = [0]")
+    mine = folder / "mine.toml"
+    mine.write_text('[vehicle]\nname = "rimac-2018"\nJzz = 1731.0\n' + text)
+    done = koop("reproduce", "eigen", "--experiment", "mine.toml", "--json", tiny=False)
+    assert done.code == 0, done.err
+    found = cells(done, "baselines")
+    labels = {vehicle for _, vehicle in found}
+    assert labels == {"rimac-2018", "rimac-2018 as its file has it"}
+    rotation = "rotation at the first yaw rate"
+    assert found[rotation, "rimac-2018"] != found[rotation, "rimac-2018 as its file has it"]
+    assert f"{found[rotation, 'rimac-2018 as its file has it']:.4g}" in done.err
+    assert "is met on the later tyre" not in done.err  # that is said of the paper's reading and size alone
+    mine.write_text('[vehicle]\nname = "rimac-2018"\n' + text)
+    once = koop("reproduce", "eigen", "--experiment", "mine.toml", "--json", tiny=False)
+    assert {vehicle for _, vehicle in cells(once, "baselines")} == {"rimac-2018"}
+
+
+def test_a_vehicle_file_beside_from_where_it_was_named(koop, folder):
+    text = (data_folder() / "vehicles" / "ctu-2020.toml").read_text()
+    (folder / "heavy.toml").write_text(text.replace("1300.0", "2600.0"))
+    plan = ["--set", "reproduce.seeds=[0]", "--set", "reproduce.cuts=[1e-8]"]
+    done = koop("reproduce", "eigen", "--set", 'reproduce.beside=["./heavy.toml"]', *plan, "--dry-run", "--json")
+    assert done.code == 0, done.err
+    masses = {s["settings"]["m"] for s in json.loads(done.out)["steps"] if s["name"].startswith("sample")}
+    assert masses == {1300.0, 2600.0}
+    assert koop("reproduce", "eigen", "--set", "reproduce.beside=[]", *plan, "--dry-run", "--json").code == 0
+
+
+def test_the_baselines_of_one_method_ignore_the_settings_of_the_other(koop, folder):
+    """EDMD beside eigenfunctions is EDMD of the order that its row names."""
+    text = (folder.parent / "tiny.toml").read_text().replace("order = 2", 'order = 2\nbasis = "states"')
+    (folder / "mine.toml").write_text(text)
+    plan = koop("reproduce", "eigen", "--experiment", "mine.toml", "--dry-run", "--json", tiny=False)
+    fits = [s["settings"] for s in json.loads(plan.out)["steps"] if s["name"].startswith("fit-edmd")]
+    assert {(fit["basis"], fit["order"]) for fit in fits} == {("states", 1), ("tensor", 3), ("tensor", 5)}

@@ -72,7 +72,9 @@ def test_the_paper_file_writes_out_every_default():
         assert set(PAPER[section][kind]) == {f.name for f in fields(SAMPLES[kind])} - {"kind", "m", "Jzz"}
     for section, cls in {"fit-edmd": FitEdmd, "fit-eigen": FitEigen, "evaluate": Evaluate}.items():
         assert set(PAPER[section]) == {f.name for f in fields(cls) if f.default is not None}
-    assert set(PAPER) == set(SECTIONS) - {"baseline"}
+    assert set(PAPER["reproduce"]) == {f.name for f in fields(Reproduce)}
+    assert loaded.baseline == Baseline(**PAPER["baseline"])
+    assert set(PAPER) == set(SECTIONS)
 
 
 def test_every_setting_has_a_help_text():

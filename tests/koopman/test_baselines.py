@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from koopcli.koopman.baselines import FORECASTS, Forecast
+from koopcli.koopman.baselines import FORECASTS, Forecast, _exponential
 from koopcli.koopman.coverage import coverage_of
 from koopcli.vehicles.single_track import ForceInput
 from tests.conftest import ball_of, box_sample, trajectories_of
@@ -14,7 +14,7 @@ from tests.conftest import ball_of, box_sample, trajectories_of
 def forecast(kind, plant, name="slips"):
     about = {"plant": name, "force_per": "axle", "v_eps": 0.1, "vehicle": asdict(plant.parameters)}
     states = np.random.default_rng(0).uniform(-1, 1, (20, 3))
-    coverage = coverage_of(states, np.stack([states.min(axis=0), states.max(axis=0)]))
+    coverage = coverage_of(lambda: [states], len(states))
     return Forecast(kind, 0.01, coverage, plant.states, plant.inputs, about)
 
 
@@ -59,3 +59,15 @@ def test_every_baseline_starts_exactly_steps_and_survives_storage(sliding, start
     again = Forecast.unpack(one.pack())
     assert (again.predict(x0, u) == x).all()
     assert not again.knows_inputs
+
+
+def test_the_exponential_of_many_matrices():
+    from scipy.linalg import expm
+
+    rng = np.random.default_rng(2)
+    for size in (1e-9, 0.3, 5.0, 60.0):
+        M = rng.standard_normal((40, 4, 4)) * size
+        M[:20] -= 2 * size * np.eye(4)
+        expected = np.stack([expm(one) for one in M])
+        scale = np.abs(expected).max(axis=(1, 2), keepdims=True)
+        assert _exponential(M) / scale == pytest.approx(expected / scale, abs=1e-9)

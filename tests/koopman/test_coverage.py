@@ -19,14 +19,14 @@ def test_distances_in_half_widths_of_the_data(cloud):
     x = np.random.default_rng(1).uniform(-40, 40, (50, 3))
     half = (domain[1] - domain[0]) / 2
     brute = np.sqrt((((x[:, None] - states) / half) ** 2).sum(axis=2)).min(axis=1)
-    coverage = coverage_of(states, domain)
+    coverage = coverage_of(lambda: [states], len(states))
     assert coverage.distance(x) == pytest.approx(brute, rel=1e-9)
     assert coverage.distance(states) == pytest.approx(np.zeros(500), abs=1e-12)
 
 
 def test_inside_and_outside_the_hull(cloud):
     states, domain = cloud
-    coverage = coverage_of(states, domain)
+    coverage = coverage_of(lambda: [states], len(states))
     assert not coverage.outside(states).any()
     centre = states.mean(axis=0)
     mixtures = np.random.default_rng(2).dirichlet(np.ones(500), 100) @ states
@@ -44,15 +44,29 @@ def coverage_extreme(states):
 
 def test_states_in_a_plane_fall_back_to_their_box():
     states = np.random.default_rng(3).uniform(-1, 1, (30, 3)) * [1, 1, 0]
-    domain = np.stack([states.min(axis=0), states.max(axis=0)])
-    coverage = coverage_of(states, domain)
+    coverage = coverage_of(lambda: [states], len(states))
     assert not coverage.outside(states).any()
     assert coverage.outside(np.array([[2.0, 0, 0], [0, 0, 3.0]])).all()
     assert np.isfinite(coverage.distance(np.array([[0.0, 0, 3.0]]))).all()
 
 
+def test_blocks_and_thinning_change_no_hull(cloud, monkeypatch):
+    """Every state counts for the hull and the box, however few are kept for distances."""
+    from koopcli.koopman import coverage as module
+
+    states, _ = cloud
+    whole = coverage_of(lambda: [states], 500)
+    monkeypatch.setattr(module, "STATES_LIMIT", 100)
+    thinned = coverage_of(lambda: (states[i : i + 7] for i in range(0, 500, 7)), 500)
+    assert len(thinned.states) <= 100
+    assert (thinned.domain == whole.domain).all()
+    x = np.random.default_rng(5).uniform(-40, 40, (400, 3))
+    assert (thinned.outside(x) == whole.outside(x)).all()
+    assert not thinned.outside(states).any()
+
+
 def test_it_survives_storage(cloud):
-    coverage = coverage_of(*cloud)
+    coverage = coverage_of(lambda: [cloud[0]], 500)
     again = Coverage.unpack(coverage.pack("m/s, m/s, rad/s"))
     x = np.random.default_rng(4).uniform(-40, 40, (50, 3))
     assert (again.distance(x) == coverage.distance(x)).all()

@@ -23,6 +23,8 @@ def test_it_multiplies_like_its_matrix(modes):
     rows = np.random.default_rng(0).standard_normal((5, 3, 24))
     assert len(modes) == 24
     assert rows @ modes == pytest.approx(rows @ dense(modes), rel=1e-13, abs=1e-13)
+    assert modes @ rows[0].T == pytest.approx(dense(modes) @ rows[0].T, rel=1e-13, abs=1e-13)
+    assert modes @ rows[0, 0] == pytest.approx(dense(modes) @ rows[0, 0], rel=1e-13, abs=1e-13)
 
 
 def test_its_eigenvalues_are_those_of_the_rates(modes):

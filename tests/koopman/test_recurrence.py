@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.recurrence import check_recurrence, check_starts
+from koopcli.koopman.recurrence import Surface, check_recurrence, check_starts
 from koopcli.vehicles.single_track import SlipInput
 from tests.conftest import surface_of, trajectories_of
+
+
+def surface(plant) -> Surface:
+    return Surface(plant.kinetic_energy, lambda x: plant.rhs(x, np.zeros((len(x), 4))))
 
 
 def circling(turns: float, start: int = 5, samples: int = 60) -> np.ndarray:
@@ -23,8 +27,8 @@ def circling(turns: float, start: int = 5, samples: int = 60) -> np.ndarray:
 @pytest.mark.parametrize("mesh", ["sphere", "fibonacci"])
 def test_a_car_that_loses_energy_leaves_its_surface(slips, mesh):
     data = trajectories_of(slips, surface_of(slips, 441, mesh), 150)
-    check_recurrence(data.x, data.dt, slips.kinetic_energy, lambda x: slips.rhs(x, np.zeros((len(x), 4))))
-    check_recurrence(data.x, data.dt)
+    assert check_recurrence(data.x, data.dt, surface(slips))
+    assert not check_recurrence(data.x, data.dt)
 
 
 def test_a_closed_orbit_is_found_with_its_trajectory_and_time():
@@ -50,6 +54,17 @@ def test_another_trajectorys_start_counts():
         check_recurrence(x, 0.1)
 
 
+def test_a_start_in_the_middle_of_a_step_is_found_among_others():
+    """Starts nearer to the ends of the step than the one that is met do not hide it."""
+    x = np.zeros((4, 5, 3))
+    x[0, :, 0] = [-10, 0, 10, 20, 30]
+    x[1:] = np.array([[15.0, 0, 0], [11, 1, 0], [19, 1, 0]])[:, None] + np.arange(5)[:, None] * [0, 0, 50.0]
+    with pytest.raises(
+        InvalidValueError, match=r"trajectory 0 comes back at 0\.2 s to the initial state of trajectory 1"
+    ):
+        check_recurrence(x, 0.1)
+
+
 def test_rest_is_a_return():
     x = np.tile([3.0, 0.0, 0.0], (1, 5, 1))
     with pytest.raises(InvalidValueError, match=r"comes back at 0\.01 s"):
@@ -68,7 +83,7 @@ def test_a_car_that_keeps_its_energy_is_refused(vehicle, changed, says):
     plant = SlipInput(replace(vehicle, **changed))
     data = trajectories_of(plant, surface_of(plant), 20)
     with pytest.raises(InvalidValueError, match=says):
-        check_recurrence(data.x, data.dt, plant.kinetic_energy, lambda x: plant.rhs(x, np.zeros((len(x), 4))))
+        check_recurrence(data.x, data.dt, surface(plant))
 
 
 def test_energy_that_comes_back_later_is_found(sliding):
@@ -76,14 +91,14 @@ def test_energy_that_comes_back_later_is_found(sliding):
     x = np.array(data.x)
     x[7, 15] = x[7, 0] * 1.01
     with pytest.raises(InvalidValueError, match=r"trajectory 7 comes back to .* at 0\.15 s"):
-        check_recurrence(x, 0.01, sliding.kinetic_energy, lambda s: sliding.rhs(s, np.zeros((len(s), 4))))
+        check_recurrence(x, 0.01, surface(sliding))
 
 
 def test_states_of_several_energies_are_only_checked_pointwise(sliding):
     """Shells and volumes are no surface of one energy; their trajectories may cross one another's level."""
     x0 = np.concatenate([f * surface_of(sliding, n, "fibonacci").states for f, n in ((1, 25), (0.5, 16))])
     x = trajectories_of(sliding, replace(surface_of(sliding), states=x0, inputs=np.zeros((41, 1, 4))), 60).x
-    check_recurrence(x, 0.01, sliding.kinetic_energy, lambda s: sliding.rhs(s, np.zeros((len(s), 4))))
+    assert not check_recurrence(x, 0.01, surface(sliding))
 
 
 def test_equal_initial_states(sliding):
