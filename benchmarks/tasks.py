@@ -37,6 +37,8 @@ def fit_product(store: Path):
 def fit_blocks(store: Path):
     from dataclasses import replace
 
+    from scipy.spatial import ConvexHull  # noqa: F401  (imports aside)
+
     data = replace(koopcli.load("simulate", store), product=None)
     yield
     basis = edmd.basis_from_data(data, "tensor", ORDER)
@@ -54,6 +56,8 @@ def fit_plain(store: Path):
 
 
 def evaluation(store: Path):
+    from scipy.spatial import cKDTree  # noqa: F401  (imports aside)
+
     predictor, test = koopcli.load("fit-edmd", store), koopcli.load("simulate", store / "test")
     yield
     parts = [evaluate(predictor, test, slice(i, i + 2048), 1) for i in range(0, len(test), 2048)]

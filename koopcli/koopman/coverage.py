@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -99,13 +100,21 @@ def _corners(x: FloatArray) -> FloatArray:
 
 
 def _hull(x: FloatArray) -> Any:
-    from scipy.spatial import ConvexHull, QhullError  # noqa: PLC0415
+    """The convex hull of ``x`` (m, n_x), None where its box is all there is to know: in a plane, and on a full grid."""
+    if _fills_its_box(x):
+        return None
+    from scipy.spatial import ConvexHull, QhullError  # noqa: PLC0415  (a fit on a grid goes without)
 
-    distinct = x if len(x) > 1 << 16 else np.unique(x, axis=0)
     try:
-        return ConvexHull(x) if len(distinct) > x.shape[1] else None
+        return ConvexHull(x)
     except (QhullError, ValueError):
         return None
+
+
+def _fills_its_box(x: FloatArray) -> bool:
+    """Whether ``x`` is a grid with every combination of its values, whose hull is its box."""
+    values = math.prod(len(np.unique(column)) for column in x.T)
+    return values <= len(x) and values == len(np.unique(x, axis=0))
 
 
 def _in_half_widths(x: FloatArray, domain: FloatArray) -> FloatArray:

@@ -98,9 +98,9 @@ def _everywhere(experiment: Experiment) -> list[tuple[str, Experiment]]:
     found = [(experiment.vehicle_name, experiment)]
     for name in experiment.reproduce.beside:
         there = experiment.with_vehicle(name)
-        label = there_name = Path(name).stem
+        label = Path(name).stem
         if any(label == known for known, _ in found):
-            label = f"{there_name} as its file has it"
+            label = f"{label} as its file has it"
         if all(there.vehicle != one.vehicle for _, one in found):
             found.append((label, there))
     return found

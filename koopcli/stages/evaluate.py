@@ -19,7 +19,6 @@ from koopcli.vehicles.plants import PLANTS
 
 def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
     predictor, trajectories = inputs["predictor"], inputs["trajectories"]
-
     assert settings.first is not None, "settled from the plant"
     first = settings.first
 

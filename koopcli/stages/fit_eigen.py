@@ -23,7 +23,7 @@ def _run(settings: FitEigen, inputs: Inputs, context: Context) -> Predictor:
     x = eigenfunctions.autonomous(trajectories)
     _check_surface(x, trajectories, context)
     context.progress(1, 2)
-    predictor = eigenfunctions.fit(
+    return eigenfunctions.fit(
         trajectories,
         degree=settings.degree,
         boundary=settings.boundary,
@@ -33,7 +33,6 @@ def _run(settings: FitEigen, inputs: Inputs, context: Context) -> Predictor:
         cut=settings.cut,
         tabulated=_tabulated(settings, trajectories.dt),
     )
-    return predictor
 
 
 def _figures(predictor: Predictor) -> Meta:

@@ -42,6 +42,16 @@ def coverage_extreme(states):
     return ConvexHull(states).vertices
 
 
+def test_a_grid_is_its_box():
+    axes = [np.array([-1.0, 0.3, 2.0]), np.array([0.0, 5.0]), np.array([-3.0, -2.0, 4.0])]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    x = np.random.default_rng(6).uniform(-6, 6, (500, 3))
+    expected = ((x < grid.min(axis=0)) | (x > grid.max(axis=0))).any(axis=1)
+    for states in (grid, grid[:-1]):  # without a corner it is a hull like any other
+        coverage = coverage_of(lambda states=states: [states], len(states))
+        assert (coverage.outside(x) == expected).all() == (len(states) == len(grid))
+
+
 def test_states_in_a_plane_fall_back_to_their_box():
     states = np.random.default_rng(3).uniform(-1, 1, (30, 3)) * [1, 1, 0]
     coverage = coverage_of(lambda: [states], len(states))

@@ -7,8 +7,10 @@ import pytest
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import edmd
+from koopcli.koopman.eigenfunctions import fit
 from koopcli.koopman.evaluation import Evaluation, evaluate, join
-from tests.conftest import box_sample, grid_sample, trajectories_of
+from koopcli.vehicles.single_track import SlipInput
+from tests.conftest import ball_of, box_sample, grid_sample, surface_of, trajectories_of
 
 
 @pytest.fixture(scope="module")
@@ -78,3 +80,50 @@ def test_the_table_has_a_row_for_each_trajectory(pair):
     assert len(rows) == 50
     assert all(len(row) == len(header) for row in rows)
     assert rows[7][header.index("rmse (%)")] == evaluation.rmse[7]
+
+
+@pytest.fixture(scope="module")
+def looked_up(vehicle):
+    """A predictor whose value at k = 0 is an approximation."""
+    plant = SlipInput(vehicle)
+    settings = {"degree": 2, "boundary": "optimal", "centres": 1, "seed": 0, "scaling": "raw", "cut": 1e-8}
+    predictor = fit(trajectories_of(plant, surface_of(plant, 49), 30), **settings, tabulated=20)
+    return predictor, trajectories_of(plant, ball_of(plant, 60), 10)
+
+
+def test_the_error_at_the_start_and_the_first_sample_that_counts(looked_up, pair):
+    predictor, test = looked_up
+    scored = evaluate(predictor, test, slice(None), 0)
+    predicted = predictor.predict(test.x[:, 0], steps=10)
+    size = np.linalg.norm(test.x[:, 0], axis=1)
+    assert scored.start_error == pytest.approx(100 * np.linalg.norm(predicted[:, 0] - test.x[:, 0], axis=1) / size)
+    assert scored.start_error.min() > 0.1
+    error = np.sqrt(((predicted - test.x) ** 2).sum((1, 2)) / (np.asarray(test.x) ** 2).sum((1, 2)))
+    assert scored.rmse == pytest.approx(100 * error)
+    assert (evaluate(predictor, test, slice(None), 1).rmse != scored.rmse).all()
+    assert evaluate(*pair, slice(None), 1).start_error.max() < 1e-9  # EDMD holds the states themselves
+
+
+def test_relifting_starts_from_the_state_that_is_known(looked_up):
+    predictor, test = looked_up
+    x = [predictor.predict(test.x[:, 0], steps=0)[:, 0]]
+    at = np.asarray(test.x[:, 0])
+    for _ in range(10):
+        at = predictor.predict(at, steps=1)[:, 1]
+        x.append(at)
+    error = np.sqrt(((np.stack(x, axis=1) - test.x) ** 2).sum((1, 2)) / (np.asarray(test.x) ** 2).sum((1, 2)))
+    assert evaluate(predictor, test, slice(None), 0).rmse_relift == pytest.approx(100 * error, rel=1e-9)
+
+
+def test_where_the_test_states_are(looked_up):
+    predictor, test = looked_up
+    scored = evaluate(predictor, test, slice(None), 0)
+    table, domain = predictor.observables.states.reshape(-1, 3), predictor.coverage.domain
+    half = (domain[1] - domain[0]) / 2
+    brute = [np.sqrt((((x - table) / half) ** 2).sum(axis=1)).min() for x in scored.x0]
+    assert scored.distance == pytest.approx(np.array(brute))
+    assert 0 < scored.outside.sum() < 60
+    figures = scored.figures()
+    worst, emptiest = scored.rmse.argsort()[-3:], scored.distance.argsort()[-3:]
+    assert figures["worst_in_emptiest"] == pytest.approx(len(set(worst) & set(emptiest)) / 3)
+    assert figures["outside"] == scored.outside.sum()
