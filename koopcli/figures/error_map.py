@@ -61,8 +61,11 @@ def draw(shown: ErrorMap) -> Figure:
         figure = Figure(figsize=(COLUMN, 5.4), layout="constrained")
         panels = figure.subplots(2)
         for axes, (i, j) in zip(panels, ((0, 1), (n_x - 2, n_x - 1)), strict=True):
-            lines = LineCollection(list(shown.paths[:, :, [i, j]]), colors=TRAINING, linewidths=0.3, rasterized=True)
-            axes.add_collection(lines)
+            if shown.paths.shape[1] > 2:
+                lines = list(shown.paths[:, :, [i, j]])
+                axes.add_collection(LineCollection(lines, colors=TRAINING, linewidths=0.3, rasterized=True))
+            else:  # single steps are too short to see
+                axes.plot(shown.paths[:, 0, i], shown.paths[:, 0, j], "s", color=TRAINING, markersize=3, zorder=1)
             balls = axes.scatter(
                 shown.x0[:, i],
                 shown.x0[:, j],

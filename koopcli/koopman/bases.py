@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, Protocol
 
 import numpy as np
 
-from koopcli.koopman.lifts import Lift
+from koopcli.koopman.lifts import Lift, Observed
 from koopcli.koopman.orthonormal import OrthonormalPolynomials, orthonormal_polynomials
 from koopcli.records import Array, FloatArray, Packed
 
@@ -70,6 +71,10 @@ class TensorPolynomial:
     def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
         """rows · ψ(x) as (n, R), for ``rows`` (R, N)."""
         return self.lift(x) @ rows.T
+
+    def onto(self, rows: FloatArray) -> Observed:
+        """The function of ``x`` (n, n_x) that observes ``rows`` (R, N)."""
+        return partial(self.observe, rows=rows)
 
     def group_moments(self, x: FloatArray, weights: FloatArray) -> FloatArray:
         """Σ_j weights[j] ψ(x[s, j]) as (n, q, N), for states in groups (n, m, n_x) and weights (m, q).
@@ -133,6 +138,10 @@ class States:
     def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
         """rows · x as (n, R), for ``rows`` (R, n_x)."""
         return x @ rows.T
+
+    def onto(self, rows: FloatArray) -> Observed:
+        """The function of ``x`` (n, n_x) that observes ``rows`` (R, n_x)."""
+        return partial(self.observe, rows=rows)
 
     def group_moments(self, x: FloatArray, weights: FloatArray) -> FloatArray:
         """Σ_j weights[j] x[s, j] as (n, q, n_x), for states in groups (n, m, n_x) and weights (m, q)."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 from koopcli.records import FloatArray, Packed
+
+Observed = Callable[[FloatArray], FloatArray]
 
 
 class Lift(Protocol):
@@ -19,6 +22,9 @@ class Lift(Protocol):
 
     def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
         """rows · ψ(x) as (n, R), for ``rows`` (R, N), which need not form ψ(x)."""
+
+    def onto(self, rows: FloatArray) -> Observed:
+        """The same for many calls with the same ``rows`` (R, N): a function of ``x`` (n, n_x) to (n, R)."""
 
     def pack(self) -> Packed:
         """The lift as arrays, with its kind."""

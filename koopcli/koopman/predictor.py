@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.bases import BASES
 from koopcli.koopman.coverage import Coverage
-from koopcli.koopman.lifts import Lift
+from koopcli.koopman.lifts import Lift, Observed
 from koopcli.koopman.modes import Modes
 from koopcli.koopman.tabulated import Nearest
 from koopcli.records import Array, Channels, FloatArray, Meta, Packed
@@ -85,7 +86,12 @@ class Predictor:
 
     def step(self, x: FloatArray, u: FloatArray) -> FloatArray:
         """One step from the states ``x`` (n, n_x) lifted afresh, under ``u`` (n, n_u)."""
-        return self.observables.observe(x, self.C @ self.A) + u @ (self.C @ self.B).T
+        return self._onward(x) + u @ (self.C @ self.B).T
+
+    @cached_property
+    def _onward(self) -> Observed:
+        """C A ψ(x)."""
+        return self.observables.onto(self.C @ self.A)
 
     def pack(self) -> Packed:
         """The predictor for storage."""
@@ -163,10 +169,9 @@ def _pack_operator(A: FloatArray | Modes) -> dict[str, Array]:
 
 
 def _unpack_lift(packed: Packed, A: FloatArray | Modes) -> Lift:
+    """A table, which its modes carry on, or a basis."""
     kind = packed.meta["kind"]
-    if isinstance(A, Modes):
-        return TABLES[kind](packed, A)
-    return BASES[kind].unpack(packed)
+    return TABLES[kind](packed, A) if isinstance(A, Modes) else BASES[kind].unpack(packed)
 
 
 def _below(prefix: str, arrays: Mapping[str, Array]) -> dict[str, Array]:

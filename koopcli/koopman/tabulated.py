@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from koopcli.koopman.lifts import Observed
 from koopcli.koopman.modes import IndexArray, Modes
 from koopcli.records import Array, FloatArray, Packed
 
@@ -47,6 +48,23 @@ class Nearest:
         used, position = np.unique(j, return_inverse=True)
         there = (self.starts[used, :, 0] @ by_copy).reshape(len(used), len(rows), L)
         return np.asarray(np.matmul(there[position], self._powers[k][:, :, :1])[:, :, 0])
+
+    def onto(self, rows: FloatArray) -> Observed:
+        """The function of ``x`` (n, n_x) that looks rows · ψ up, tabulated at every sample, for few ``rows`` (R, N)."""
+        J, K, L = len(self.states), self.states.shape[1], len(self.modes.rates)
+        by_copy = rows.reshape(len(rows), self.modes.copies, L)
+        if self.starts.shape[2] == L:
+            carried = np.tensordot(by_copy, self._powers, axes=(2, 1))  # (R, copies, K, L)
+            table = np.tensordot(self.starts, carried, axes=([1, 2], [1, 3])).transpose(0, 2, 1)
+        else:
+            there = np.tensordot(self.starts[:, :, 0], by_copy, axes=(1, 1))  # (J, R, L)
+            table = np.tensordot(there, self._powers[:, :, 0], axes=(2, 1)).transpose(0, 2, 1)
+        assert table.shape == (J, K, len(rows))
+
+        def look_up(x: FloatArray) -> FloatArray:
+            return np.asarray(table[self.nearest(x)])
+
+        return look_up
 
     def nearest(self, x: FloatArray) -> tuple[IndexArray, IndexArray]:
         """Trajectory and sample (n,) of the tabulated state nearest to each of ``x`` (n, n_x).

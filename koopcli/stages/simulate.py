@@ -69,7 +69,7 @@ def _check(task: Task) -> None:
 
 def _estimate(task: Task) -> Cost:
     n, steps = task.ancestor("sample").settings.trajectories, task.settings.steps
-    each = 3e-7 if task.settings.plant == "forces" else 2e-5
+    each = 3e-7 if task.settings.plant == "forces" else 1e-5 * max(1.0, task.settings.dt / 0.01)  # s, with substeps
     return Cost(each * n * steps, 8.0 * n * (3 * (steps + 1) + 4 * steps))
 
 

@@ -43,6 +43,9 @@ class Monomials:
     def observe(self, x, rows):
         return self.lift(x) @ rows.T
 
+    def onto(self, rows):
+        return lambda x: self.observe(x, rows)
+
     def group_moments(self, x, weights):
         z = self.lift(x.reshape(-1, x.shape[-1])).reshape(*x.shape[:2], -1)
         return np.einsum("jq,sjN->sqN", weights, z)

@@ -46,6 +46,7 @@ def test_observing_is_lifting_and_multiplying(lift):
     rng = np.random.default_rng(2)
     x, rows = rng.uniform(-1, 1, (40, 3)), rng.standard_normal((6, 20))
     assert lift.observe(x, rows) == pytest.approx(lift.lift(x) @ rows.T, rel=1e-12, abs=1e-12)
+    assert lift.onto(rows)(x) == pytest.approx(lift.observe(x, rows), rel=1e-12, abs=1e-12)
     assert lift.functions == 20
 
 
