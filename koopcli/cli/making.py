@@ -1,4 +1,4 @@
-"""The commands that make artefacts: sample, simulate, fit-edmd, fit-eigen, baseline, evaluate."""
+"""The commands that make data and scores: sample, simulate, evaluate."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from koopcli.cli import fitting
 from koopcli.cli.invocation import begin
 from koopcli.cli.options import (
     DryRunOption,
@@ -17,32 +18,23 @@ from koopcli.cli.options import (
     complete_name,
     names,
 )
-from koopcli.config.experiment import Changes, Values
+from koopcli.config.experiment import Values
 from koopcli.config.settings import (
     BallSample,
-    BaselineKind,
-    BasisName,
-    Boundary,
     BoxSample,
     Draw,
     EllipsoidSample,
     Excitation,
-    FitEdmd,
-    FitEigen,
     ForcePer,
     GridSample,
     Kind,
-    LiftName,
     Mesh,
     PlantName,
     Simulate,
 )
 
 SAMPLE = ("sample", "vehicle")
-SIMULATE = (*SAMPLE, "simulate")
-FIT_EDMD = (*SIMULATE, "fit-edmd")
-FIT_EIGEN = (*SIMULATE, "fit-eigen")
-BASELINE = (*SIMULATE, "baseline")
+SIMULATE = fitting.DATA
 TEST = ("test", "evaluate")
 
 
@@ -158,132 +150,6 @@ def simulate(
     call.run(recipes.simulation(call.experiment, of), as_json=as_json, dry_run=dry_run)
 
 
-def fit_edmd(
-    trajectories: Annotated[
-        str | None,
-        typer.Argument(autocompletion=complete_name, help="Trajectories; made from the settings when left out."),
-    ] = None,
-    order: Annotated[int | None, typer.Option(help=f"Highest degree of each state ({FitEdmd.order}).")] = None,
-    vehicle: VehicleOption = None,
-    basis: Annotated[
-        BasisName | None, typer.Option(metavar=names(BasisName), help=f"Family of observables ({FitEdmd.basis}).")
-    ] = None,
-    set_: SetOption = None,
-    experiment: ExperimentOption = "paper",
-    store: StoreOption = None,
-    dry_run: DryRunOption = False,
-    as_json: JsonOption = False,
-) -> None:
-    """Fit a Koopman predictor z⁺ = A z + B u, x̂ = C z by extended dynamic mode decomposition.
-
-    Example: koop fit-edmd --order 7
-    """
-    given: Changes = {"fit-edmd": {"order": order, "basis": basis}, "vehicle": {"name": vehicle}}
-    call = begin(store, experiment, set_, FIT_EDMD, given)
-    from koopcli.stages import recipes
-
-    of = call.named(trajectories, ["simulate"], "the TRAJECTORIES", ("fit-edmd",)) if trajectories else None
-    call.run(recipes.fit_edmd(call.experiment, of), as_json=as_json, dry_run=dry_run)
-
-
-def fit_eigen(
-    trajectories: Annotated[
-        str | None,
-        typer.Argument(autocompletion=complete_name, help="Trajectories; made from the settings when left out."),
-    ] = None,
-    degree: Annotated[
-        int | None,
-        typer.Option(
-            help="Rates of growth are sums of up to this many of the data's three: 1, 2, 3 give 4, 10, 20 rates "
-            f"({FitEigen.degree})."
-        ),
-    ] = None,
-    boundary: Annotated[
-        Boundary | None,
-        typer.Option(
-            metavar=names(Boundary),
-            help="Values of the eigenfunctions at the initial states: thin-plate splines of the state, as in the "
-            f"paper, or the best ones for each trajectory ({FitEigen.boundary}).",
-        ),
-    ] = None,
-    centres: Annotated[int | None, typer.Option(help=f"thin-plate: number of splines ({FitEigen.centres}).")] = None,
-    cut: Annotated[
-        float | None,
-        typer.Option(
-            help="Smallest singular value kept, relative to the largest; the errors depend on it (1e-14 for "
-            "thin-plate, working precision for optimal)."
-        ),
-    ] = None,
-    lift: Annotated[
-        LiftName | None, typer.Option(metavar=names(LiftName), help=f"How a state is looked up ({FitEigen.lift}).")
-    ] = None,
-    tabulate: Annotated[
-        float | None,
-        typer.Option(
-            help="Seconds of each trajectory in which a state is looked up; what is simulated beyond is the longest "
-            f"prediction ({FitEigen.tabulate:g})."
-        ),
-    ] = None,
-    vehicle: VehicleOption = None,
-    set_: SetOption = None,
-    experiment: ExperimentOption = "paper",
-    store: StoreOption = None,
-    dry_run: DryRunOption = False,
-    as_json: JsonOption = False,
-) -> None:
-    """Fit a Koopman predictor whose lifted states are eigenfunctions, built from trajectories without inputs.
-
-    The trajectories start on a surface Γ of one kinetic energy (kind ellipsoid) and never return to it. Along each of
-    them an eigenfunction grows as exp(rate · time) from its value on Γ; a new state takes the values of the nearest
-    sample. Inputs have no effect on the prediction.
-
-    Example: koop fit-eigen --boundary optimal --cut 1e-10
-    """
-    fit: Values = {
-        "degree": degree,
-        "boundary": boundary,
-        "centres": centres,
-        "cut": cut,
-        "lift": lift,
-        "tabulate": tabulate,
-    }
-    call = begin(store, experiment, set_, FIT_EIGEN, {"fit-eigen": fit, "vehicle": {"name": vehicle}})
-    from koopcli.stages import recipes
-
-    of = call.named(trajectories, ["simulate"], "the TRAJECTORIES", ("fit-eigen",)) if trajectories else None
-    call.run(recipes.fit_eigen(call.experiment, of), as_json=as_json, dry_run=dry_run)
-
-
-def baseline(
-    kind: Annotated[
-        BaselineKind,
-        typer.Argument(
-            metavar=names(BaselineKind),
-            help="hold: the first state; rotation: turned at its yaw rate; linearisation: of the plant at it.",
-        ),
-    ],
-    trajectories: Annotated[
-        str | None,
-        typer.Argument(autocompletion=complete_name, help="Trajectories it is set beside; made when left out."),
-    ] = None,
-    vehicle: VehicleOption = None,
-    set_: SetOption = None,
-    experiment: ExperimentOption = "paper",
-    store: StoreOption = None,
-    dry_run: DryRunOption = False,
-    as_json: JsonOption = False,
-) -> None:
-    """Make a prediction that fits nothing, to evaluate beside predictors: what any predictor has to beat.
-
-    Example: koop evaluate $(koop baseline rotation)
-    """
-    call = begin(store, experiment, set_, BASELINE, {"baseline": {"kind": kind}, "vehicle": {"name": vehicle}})
-    from koopcli.stages import recipes
-
-    of = call.named(trajectories, ["simulate"], "the TRAJECTORIES", ("baseline",)) if trajectories else None
-    call.run(recipes.baseline(call.experiment, of), as_json=as_json, dry_run=dry_run)
-
-
 def evaluate(
     predictor: Annotated[
         str | None,
@@ -323,7 +189,7 @@ def evaluate(
     Example: koop evaluate fit-edmd/3f2a --excitation held
     """
     given: Values = {"excitation": excitation, "amplitude": amplitude, "count": count, "steps": steps, "seed": seed}
-    call = begin(store, experiment, set_, (*FIT_EDMD, *TEST), {"test": given})
+    call = begin(store, experiment, set_, (*SIMULATE, "fit-edmd", *TEST), {"test": given})
     from koopcli.stages import recipes
 
     of = None
@@ -341,7 +207,5 @@ def register(app: typer.Typer) -> None:
     """Add the commands of this file."""
     app.command("sample", rich_help_panel="Make")(sample)
     app.command("simulate", rich_help_panel="Make")(simulate)
-    app.command("fit-edmd", rich_help_panel="Make")(fit_edmd)
-    app.command("fit-eigen", rich_help_panel="Make")(fit_eigen)
-    app.command("baseline", rich_help_panel="Make")(baseline)
+    fitting.register(app)
     app.command("evaluate", rich_help_panel="Make")(evaluate)

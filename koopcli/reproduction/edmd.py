@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
-from koopcli.config.settings import INPUTS, UNUSED, BoxSample, GridSample, ImageFormat
+from koopcli.config.settings import INPUTS, BoxSample, GridSample, ImageFormat
 from koopcli.errors import InvalidValueError
 from koopcli.records import Meta
-from koopcli.reproduction.report import REDUCED, Method, Picture, Run, Table, count_text, score_text
+from koopcli.reproduction.report import REDUCED, Method, Picture, Run, Table, count_text, has_effect, score_text
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 
@@ -126,16 +127,6 @@ def figures(run: Run, draw: str, order: int, excitation: str) -> Meta | None:
     return next((s.figures for s in run.scored if (s.cell.draw, s.cell.order, s.cell.excitation) == wanted), None)
 
 
-def _uses(name: str) -> bool:
-    section, _, key = name.partition(".")
-    if section == "reproduce":
-        return key in ("orders", "draws", "excitations")
-    if any(f"{name}.".startswith(f"{unused}.") for unused in UNUSED["forces"]):
-        return False
-    other = ("sample.ellipsoid", "sample.ball", "test.ellipsoid", "test.ball")
-    return section not in ("fit-eigen", "baseline") and not name.startswith(other)
-
-
 def _grid(experiment: Experiment) -> GridSample:
     found = experiment.sample("grid")
     if not isinstance(found, GridSample):
@@ -186,5 +177,10 @@ METHOD = Method(
         "test.excitation": 'reproduce.excitations=["held"]',
         "test.box.excitation": 'reproduce.excitations=["held"]',
     },
-    uses=_uses,
+    uses=partial(
+        has_effect,
+        plant="forces",
+        swept=("orders", "draws", "excitations"),
+        foreign=("fit-eigen", "baseline", "sample.ellipsoid", "sample.ball", "test.ball"),
+    ),
 )

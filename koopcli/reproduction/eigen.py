@@ -1,114 +1,46 @@
-"""The paper's eigenfunction experiment: its reading, the readings beside it, what it is sensitive to, and baselines."""
+"""The paper's eigenfunction experiment beside what was found here: tables and what they mean."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import product
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from koopcli.config.experiment import DEFAULT_VEHICLE, Experiment, vehicle_named
 from koopcli.config.paper import EIGEN_RMSE
-from koopcli.config.settings import (
-    UNUSED,
-    BallSample,
-    Baseline,
-    EllipsoidSample,
-    FitEdmd,
-    FitEigen,
-    ImageFormat,
-    Simulate,
-)
-from koopcli.errors import InvalidValueError
+from koopcli.config.settings import BallSample, EllipsoidSample, FitEigen, ImageFormat, Simulate
 from koopcli.records import Meta
-from koopcli.reproduction.report import REDUCED, Method, Picture, Run, Table, count_text, score_text
+from koopcli.reproduction.eigen_cells import (
+    BASELINES,
+    CUTS,
+    GRIP,
+    HEADLINE,
+    READINGS,
+    ball,
+    cells,
+    cut_text,
+    evaluated,
+    surface,
+)
+from koopcli.reproduction.report import (
+    REDUCED,
+    Method,
+    Picture,
+    Run,
+    Table,
+    count_text,
+    has_effect,
+    score_text,
+)
 from koopcli.stages import recipes
-from koopcli.stages.base import Task
-from koopcli.vehicles.single_track import G
 
-CUT = 1e-10  # of the readings with optimal boundary functions
-PEAK = 7800.0  # N, a peak force that does not follow the load
-LITERAL_STEPS, LITERAL_TABLE = 1.0, 0.5  # s: "T = 1 s" taken as all that is simulated
-CENTRES = (382, 441, 1000)  # distinct initial states, all of them, and many
-FEW_CENTRES = 100
-EDMD_ORDERS = (3, 5)
 SIZES = (count_text(EllipsoidSample.count), count_text(BallSample.count, BallSample.steps))  # the paper's
-HEADLINE, READINGS, CUTS, GRIP, BASELINES = "headline", "readings", "cuts", "grip", "baselines"
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One reading of the method, or a baseline, on the test states of one seed. ``block`` is the table it stands in."""
-
-    block: str
-    label: str
-    vehicle: str
-    seed: int
-
-
-def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
-    """Every cell of the experiment with its evaluation."""
-    plan, main = experiment.reproduce, experiment.vehicle_name
-    first = plan.seeds[0]
-    everywhere = _everywhere(experiment)
-    as_given = experiment.fit_eigen
-    splines = FitEigen(tabulate=as_given.tabulate)  # a row means what it says, whatever the experiment changes
-    optimal = replace(splines, boundary="optimal")
-
-    for (vehicle, there), seed in product(everywhere, plan.seeds):
-        yield Cell(HEADLINE, "as the experiment says", vehicle, seed), _eigen(there, as_given, seed)
-    for centres in CENTRES:
-        fit = replace(splines, centres=centres, scaling="extent")
-        yield Cell(READINGS, f"thin-plate, {centres} centres, scaled", main, first), _eigen(experiment, fit, first)
-    for cut in (None, CUT):
-        fit = replace(splines, centres=FEW_CENTRES, cut=cut)
-        yield (
-            Cell(READINGS, f"thin-plate, {FEW_CENTRES} centres{_cut(cut)}", main, first),
-            _eigen(experiment, fit, first),
-        )
-    for cut in (None, CUT):
-        fit = replace(optimal, cut=cut)
-        for (vehicle, there), seed in product(everywhere, plan.seeds):
-            yield Cell(READINGS, f"optimal{_cut(cut)}", vehicle, seed), _eigen(there, fit, seed)
-        for degree in (1, 3):
-            label = f"optimal{_cut(cut)}, sums of up to {degree}"
-            yield Cell(READINGS, label, main, first), _eigen(experiment, replace(fit, degree=degree), first)
-        literal = replace(fit, tabulate=LITERAL_TABLE)
-        label = f"optimal{_cut(cut)}, {LITERAL_STEPS:g} s simulated, {LITERAL_TABLE:g} s tabulated"
-        yield Cell(READINGS, label, main, first), _eigen(experiment, literal, first, seconds=LITERAL_STEPS)
-    peaked = _with_peak(experiment)
-    label = f"optimal{_cut(CUT)}, D = {PEAK:g} N"
-    yield Cell(READINGS, label, main, first), _eigen(peaked, replace(optimal, cut=CUT), first)
-    for fit, cut in product((splines, optimal), plan.cuts):
-        label = f"{fit.boundary}, cut {cut:g}"
-        yield Cell(CUTS, label, main, first), _eigen(experiment, replace(fit, cut=cut), first)
-    for vehicle, there in everywhere:
-        for scale in plan.mu_scales:
-            gripping = there.with_parameters(mu_scale=scale * there.vehicle.mu_scale)
-            yield Cell(GRIP, f"grip × {scale:g}", vehicle, first), _eigen(gripping, as_given, first)
-            label, fit = f"grip × {scale:g}, optimal{_cut(CUT)}", replace(optimal, cut=CUT)
-            yield Cell(GRIP, label, vehicle, first), _eigen(gripping, fit, first)
-        for label, predictor in _baselines(there):
-            yield Cell(BASELINES, label, vehicle, first), _scored(there, predictor, first)
-
-
-def _everywhere(experiment: Experiment) -> list[tuple[str, Experiment]]:
-    """The experiment's own vehicle and those beside it, each under a name of its own; the same one only once."""
-    found = [(experiment.vehicle_name, experiment)]
-    for name in experiment.reproduce.beside:
-        there = experiment.with_vehicle(name)
-        label = Path(name).stem
-        if any(label == known for known, _ in found):
-            label = f"{label} as its file has it"
-        if all(there.vehicle != one.vehicle for _, one in found):
-            found.append((label, there))
-    return found
 
 
 def pictures(run: Run, image: ImageFormat) -> list[Picture]:
     """Where the errors of the headline are, and what its mean error looks like."""
-    headline = _eigen(run.experiment, run.experiment.fit_eigen, run.experiment.reproduce.seeds[0])
+    headline = evaluated(run.experiment, run.experiment.fit_eigen, run.experiment.reproduce.seeds[0])
     return [
         Picture(recipes.figure("error-map", [headline], image), f"RMSE by initial state, {run.label}"),
         Picture(recipes.figure("mean-trajectory", [headline], image), f"A trajectory of mean RMSE, {run.label}"),
@@ -126,8 +58,8 @@ def _paper_table(runs: Sequence[Run]) -> Table:
     found = [_figures(run, HEADLINE, None, vehicle, run.experiment.reproduce.seeds[0]) for run, vehicle in columns]
     mean, std = EIGEN_RMSE
     rows = [
-        ["trajectories from Γ", SIZES[0], *(count_text(_surface(run.experiment).count) for run, _ in columns)],
-        ["test states × steps", SIZES[1], *(_tests(run.experiment) for run, _ in columns)],
+        ["trajectories from Γ", SIZES[0], *(count_text(surface(run.experiment).count) for run, _ in columns)],
+        ["test states × steps", SIZES[1], *(_tests(ball(run.experiment)) for run, _ in columns)],
         ["RMSE", f"{mean:g} ± {std:g} %", *(_score(figures, unit=" %") for figures in found)],
         *(
             [
@@ -214,20 +146,19 @@ def notes(runs: Sequence[Run]) -> list[str]:
             "they doubled, with a tyre, a number of centres and a cut that were chosen knowing the answer: the paper "
             "states none of them, and the tables show how far each moves the figure.",
         )
-    full = all((count_text(_surface(r.experiment).count), _tests(r.experiment)) == SIZES for r in runs)
+    full = all((count_text(surface(r.experiment).count), _tests(ball(r.experiment))) == SIZES for r in runs)
     return said if full else [REDUCED, *said]
 
 
 def _as_in_the_paper(experiment: Experiment) -> bool:
     """Whether nothing that moves the headline is other than in the reading that meets the paper's figure."""
-    surface, ball = _surface(experiment), experiment.test("ball", experiment.vehicle)
-    m, Jzz = surface.m, surface.Jzz
+    start, test = surface(experiment), ball(experiment)
+    m, Jzz = start.m, start.Jzz
     return (
         experiment.fit_eigen.settled() == FitEigen().settled()
         and experiment.vehicle == vehicle_named(DEFAULT_VEHICLE)
-        and surface == EllipsoidSample(m=m, Jzz=Jzz)
-        and isinstance(ball, BallSample)
-        and replace(ball, seed=BallSample.seed) == BallSample(m=m, Jzz=Jzz)
+        and start == EllipsoidSample(m=m, Jzz=Jzz)
+        and replace(test, seed=BallSample.seed) == BallSample(m=m, Jzz=Jzz)
         and experiment.simulate == Simulate(vehicle=experiment.vehicle)
     )
 
@@ -251,47 +182,6 @@ def _beaten(run: Run, vehicle: str) -> str | None:
     return f"On {_column(run, vehicle)} the method's {headline:.3g} % is beaten by {listed}."
 
 
-def _eigen(experiment: Experiment, fit: FitEigen, seed: int, seconds: float | None = None) -> Task:
-    """The evaluation of one fit on the test states of a seed, its trajectories as long as the experiment says."""
-    simulate = experiment.simulate
-    if seconds is not None:
-        simulate = replace(simulate, steps=max(1, round(seconds / simulate.dt)))
-    there = replace(experiment, fit_eigen=fit, simulate=simulate)
-    return _scored(there, recipes.fit_eigen(there, _training(there)), seed)
-
-
-def _baselines(experiment: Experiment) -> Iterator[tuple[str, Task]]:
-    training = _training(experiment)
-    labels = {
-        "hold": "hold the first state",
-        "rotation": "rotation at the first yaw rate",
-        "linearisation": "linearisation at the first state",
-    }
-    for kind, label in labels.items():
-        there = replace(experiment, baseline=Baseline(kind))  # type: ignore[arg-type]
-        yield label, recipes.baseline(there, training)
-    yield "DMD", recipes.fit_edmd(replace(experiment, fit_edmd=FitEdmd(basis="states")), training)
-    for order in EDMD_ORDERS:
-        yield f"EDMD, order {order}", recipes.fit_edmd(replace(experiment, fit_edmd=FitEdmd(order=order)), training)
-
-
-def _training(experiment: Experiment) -> Task:
-    _surface(experiment)
-    return recipes.simulation(experiment, plant="slips")
-
-
-def _scored(experiment: Experiment, predictor: Task, seed: int) -> Task:
-    test = recipes.test_set(experiment, predictor.ancestor("simulate").settings, seed=seed)
-    return recipes.evaluation(experiment, predictor, test)
-
-
-def _with_peak(experiment: Experiment) -> Experiment:
-    """The experiment with tyres whose lateral peak is ``PEAK`` N under the mean wheel load, whatever the grip."""
-    vehicle = experiment.vehicle
-    tyre, load = vehicle.lateral, vehicle.m * G / 4
-    return experiment.with_parameters(lateral=replace(tyre, mu=PEAK / load) if tyre else None, mu_scale=1.0)
-
-
 def _figures(run: Run, block: str, label: str | None, vehicle: str, seed: int) -> Any:
     """The figures of a cell, None where the run has none."""
     for scored in run.scored:
@@ -310,38 +200,14 @@ def _column(run: Run, vehicle: str) -> str:
     return vehicle if run.label == "here" else f"{vehicle}, {run.label}"
 
 
-def _about(fit: FitEigen) -> str:
-    settled = fit.settled()
-    splines = f", {fit.centres} centres" if fit.boundary == "thin-plate" else ""
-    return f"{fit.boundary}{splines}{_cut(settled.cut)}, sums of up to {fit.degree} rates"
-
-
-def _cut(cut: float | None) -> str:
-    return "" if cut is None else f", cut {cut:g}"
-
-
-def _surface(experiment: Experiment) -> EllipsoidSample:
-    found = experiment.sample("ellipsoid")
-    if not isinstance(found, EllipsoidSample):
-        raise InvalidValueError("reproduce eigen starts from an ellipsoid: sample.kind must be 'ellipsoid'")
-    return found
-
-
-def _tests(experiment: Experiment) -> str:
-    test = experiment.test("ball", experiment.vehicle)
-    if not isinstance(test, BallSample):
-        raise InvalidValueError("reproduce eigen tests on states in a ball: test.kind must be 'ball'")
+def _tests(test: BallSample) -> str:
     return count_text(test.count, test.steps)
 
 
-def _uses(name: str) -> bool:
-    section, _, key = name.partition(".")
-    if section == "reproduce":
-        return key in ("seeds", "cuts", "mu_scales", "beside")
-    if any(f"{name}.".startswith(f"{unused}.") for unused in UNUSED["slips"]):
-        return False
-    other = ("sample.grid", "sample.box", "test.grid", "test.box")
-    return section not in ("fit-edmd", "baseline") and not name.startswith(other)
+def _about(fit: FitEigen) -> str:
+    settled = fit.settled()
+    splines = f", {fit.centres} centres" if fit.boundary == "thin-plate" else ""
+    return f"{fit.boundary}{splines}{cut_text(settled.cut)}, sums of up to {fit.degree} rates"
 
 
 METHOD = Method(
@@ -355,5 +221,10 @@ METHOD = Method(
         "test.seed": "reproduce.seeds=[4,5]",
         "test.ball.seed": "reproduce.seeds=[4,5]",
     },
-    uses=_uses,
+    uses=partial(
+        has_effect,
+        plant="slips",
+        swept=("seeds", "cuts", "mu_scales", "beside"),
+        foreign=("fit-edmd", "baseline", "sample.grid", "sample.box", "test.grid", "test.box"),
+    ),
 )

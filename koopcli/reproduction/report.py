@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from koopcli.config.experiment import Experiment
-from koopcli.config.settings import ImageFormat
+from koopcli.config.settings import UNUSED, ImageFormat
 from koopcli.records import Meta
 from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline
@@ -81,6 +81,17 @@ def run_cells(method: Method, experiment: Experiment, pipeline: Pipeline, label:
             artefact = pipeline.make(task)
             scored.append(Scored(cell, artefact.figures, artefact.record))
     return Run(label, experiment, tuple(scored))
+
+
+def has_effect(name: str, *, plant: str, swept: Sequence[str], foreign: Sequence[str]) -> bool:
+    """Whether the setting ``name`` has an effect on a method with this ``plant``.
+
+    ``swept``: its settings of `reproduce`; ``foreign``: sections and tables that belong to the other methods.
+    """
+    section, _, key = name.partition(".")
+    if section == "reproduce":
+        return key in swept
+    return not any(f"{name}.".startswith(f"{other}.") for other in (*UNUSED[plant], *foreign))
 
 
 def full_table(method: Method, runs: Sequence[Run]) -> Table:
