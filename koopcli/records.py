@@ -78,8 +78,8 @@ class Sample:
     """Initial states and inputs.
 
     ``factors``: per state the values of a grid, or empty; then ``states`` (n, n_x) holds the initial states.
-    ``inputs`` (rows, held steps, n_u) in N. ``crossed``: every state meets every input row; otherwise row i goes
-    with state i. A single input step is held over the whole trajectory.
+    ``inputs`` (rows, held steps, n_u) in the units of their channels. ``crossed``: every state meets every input row;
+    otherwise row i goes with state i. A single input step is held over the whole trajectory.
     """
 
     factors: tuple[FloatArray, ...]

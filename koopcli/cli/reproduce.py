@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from koopcli.cli.invocation import Invocation, begin, print_json, show_plan
+from koopcli.cli.invocation import Invocation, begin, print_json, show_plan, why_idle
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption
-from koopcli.config.experiment import SECTIONS, Changes, Experiment, flat, load_experiment, nested
+from koopcli.config.experiment import SECTIONS, Experiment, flat, load_experiment, nested
 from koopcli.console import show_table
 from koopcli.errors import UsageError
 
@@ -65,7 +65,7 @@ def reproduce(
     from koopcli.reproduction.registry import METHODS
 
     chosen = list(METHODS.values()) if method == "all" else [METHODS[method]]
-    _refuse(call.changes, chosen)
+    _refuse(call, chosen)
     runs = {one.name: _experiments(call, base, one) for one in chosen}
     if dry_run:
         tasks = [task for one in chosen for _, there in runs[one.name] for _, task in one.cells(there)]
@@ -84,9 +84,11 @@ def reproduce(
     _finish(call, method, parts, as_json=as_json)
 
 
-def _refuse(changes: Changes, chosen: Sequence[Method]) -> None:
+def _refuse(call: Invocation, chosen: Sequence[Method]) -> None:
     """Refuse what the experiments fix, sweep over or have no use for."""
-    for name, _ in flat(changes):
+    for name, _ in flat(call.changes):
+        if name.startswith("fit-") and (idle := why_idle(name, call.experiment, [])):
+            raise UsageError(f"{name} changes nothing here: {idle}")
         if name in NOT_HERE:
             raise UsageError(f"reproduce has its own {name}: change it in the stages' own commands")
         for method in chosen:

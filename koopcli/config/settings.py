@@ -1,7 +1,8 @@
 """The settings of every stage: frozen, typed, bounded, with the paper's values as defaults.
 
 The allowed names are literals, so that `koop --help` needs no numerics; a test holds them equal to the registries.
-A stage's settings are part of its key. Whatever does not change a result is not in here, and ``settled`` gives a
+A stage's settings are part of its key. Whatever does not change a result is not in here (the size of a chunk moves last
+bits), and ``settled`` gives a
 setting that another one switches off its default, so that it is not in the key either.
 """
 

@@ -14,6 +14,7 @@ from koopcli.koopman.modes import IndexArray
 from koopcli.records import Array, BoolArray, FloatArray, Packed
 
 STATES_LIMIT = 1 << 16  # training states that are kept to measure distances from
+DIRECTIONS = 256
 GOLDEN = (5**0.5 - 1) / 2
 ROUNDING = 1e-9  # of a half-width: a state on the hull is inside it
 
@@ -22,8 +23,8 @@ ROUNDING = 1e-9  # of a half-width: a state on the hull is inside it
 class Coverage:
     """``states`` (m, n_x) a spread choice of training states, ``domain`` (2, n_x) the smallest and largest of all.
 
-    ``facets`` (f, n_x + 1) the convex hull of ``states`` in half-widths of the domain: inside where
-    facet · [x, 1] ≤ 0.
+    ``facets`` (f, n_x + 1) the convex hull of all of them in half-widths of the domain (its box, where they lie in a
+    plane): inside where facet · [x, 1] ≤ 0.
     """
 
     states: FloatArray
@@ -91,11 +92,15 @@ def spread(total: int, limit: int) -> IndexArray:
 
 
 def _corners(x: FloatArray) -> FloatArray:
-    """The states that the hull and the box of ``x`` hang on; all of them where there is no hull."""
+    """The states that the hull and the box of ``x`` hang on; of a grid or a plane all, or the corners if too many."""
     hull = _hull(x)
     if hull is None and len(x) <= STATES_LIMIT:
         return x
-    vertices = np.empty(0, dtype=np.intp) if hull is None else hull.vertices
+    if hull is None:  # corners of a grid or of a plane, as the farthest states in many directions
+        directions = np.random.default_rng(0).standard_normal((x.shape[1], DIRECTIONS))
+        vertices = np.concatenate([(x @ directions).argmax(axis=0), (x @ directions).argmin(axis=0)])
+    else:
+        vertices = hull.vertices
     return np.asarray(x[np.unique(np.concatenate([vertices, x.argmin(axis=0), x.argmax(axis=0)]))])
 
 

@@ -11,8 +11,7 @@ import numpy as np
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.coverage import coverage_of
 from koopcli.koopman.modes import ComplexArray, Modes, exponentials, newton_couplings
-from koopcli.koopman.predictor import Predictor
-from koopcli.koopman.tabulated import Nearest
+from koopcli.koopman.predictor import TABLES, Predictor
 from koopcli.records import FloatArray, Trajectories
 
 LARGEST_EXPONENT = 230.0  # e^230 = 1e100: products of a few such numbers are still finite
@@ -29,14 +28,15 @@ def fit(
     scaling: str,
     cut: float | None,
     tabulated: int,
+    lift: str = "nearest",
 ) -> Predictor:
     """The predictor whose lifted states are eigenfunctions, known at the first ``tabulated`` + 1 samples (7.1).
 
     ``degree`` of the lattice of rates; ``boundary`` functions ``thin-plate`` (with ``centres`` drawn from ``seed``, in
     ``raw`` units or scaled by the ``extent`` of the data) or ``optimal``; ``cut``: smallest singular value kept,
-    relative to the largest, working precision if None. What is left of each trajectory is the horizon. Raises
-    ``InvalidValueError`` for inputs that change, trajectories too short for the table or for the number of rates, and
-    rates that overflow.
+    relative to the largest, working precision if None; ``lift`` one of ``TABLES``. What is left of each trajectory is
+    the horizon. Raises ``InvalidValueError`` for inputs that change, trajectories too short for the table or for the
+    number of rates, and rates that overflow.
     """
     x, dt = autonomous(trajectories), trajectories.dt
     check_window(trajectories.steps, tabulated, dt)
@@ -56,7 +56,7 @@ def fit(
     table = x[:, : tabulated + 1]
     states = table.reshape(-1, x.shape[2])
     return Predictor(
-        observables=Nearest(table, solution.starts, modes),
+        observables=TABLES[lift](table, solution.starts, modes),
         A=modes,
         B=np.zeros((len(modes), len(trajectories.input_channels))),
         C=solution.C,

@@ -18,7 +18,7 @@ from koopcli.koopman.tabulated import Nearest
 from koopcli.records import Array, Channels, FloatArray, Meta, Packed
 
 SEGMENT = 128  # steps whose responses are formed together
-TABLES = {Nearest.kind: Nearest.unpack}  # lifts that look eigenfunctions up
+TABLES: dict[str, type[Nearest]] = {Nearest.kind: Nearest}  # lifts that look eigenfunctions up
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def _pack_operator(A: FloatArray | Modes) -> dict[str, Array]:
 def _unpack_lift(packed: Packed, A: FloatArray | Modes) -> Lift:
     """A table, which its modes carry on, or a basis."""
     kind = packed.meta["kind"]
-    return TABLES[kind](packed, A) if isinstance(A, Modes) else BASES[kind].unpack(packed)
+    return TABLES[kind].unpack(packed, A) if isinstance(A, Modes) else BASES[kind].unpack(packed)
 
 
 def _below(prefix: str, arrays: Mapping[str, Array]) -> dict[str, Array]:

@@ -12,7 +12,7 @@ from koopcli.records import FloatArray
 
 ONE_LEVEL = 1e-6  # relative spread of the energies of states that count as one level
 TOUCH = 1e-3  # of the distance between two samples: a start nearer to the path than that lies on it
-NEAR = 0.1  # of the same: a start nearer to the straight way than that is looked at closely
+NEAR = 0.1  # of the same: a start within so much more than half of it from its middle is looked at closely
 TINY = 1e-300
 REST = 1e-12  # of the largest state: a trajectory that moves less is at rest
 
@@ -90,22 +90,23 @@ def _stay_below(x: FloatArray, dt: float, surface: Surface) -> None:
 
 
 def _passes_a_start(x: FloatArray) -> _Return | None:
-    """The first path that leads through an initial state again, between its samples k and k + 1 with k ≥ 1."""
+    """The first path that leads through an initial state after its own start, between its samples k and k + 1."""
     from scipy.spatial import cKDTree  # noqa: PLC0415
 
     scale = np.abs(x).max(axis=(0, 1))
     path = x / np.where(scale > 0, scale, 1.0)
     path = np.concatenate([path, path[:, -1:]], axis=1)  # the last sample is a stretch of no length
     starts = cKDTree(path[:, 0])
-    middle = (path[:, 1:-1] + path[:, 2:]) / 2
-    length = np.linalg.norm(path[:, 2:] - path[:, 1:-1], axis=2)
+    middle = (path[:, :-1] + path[:, 1:]) / 2
+    length = np.linalg.norm(path[:, 1:] - path[:, :-1], axis=2)
     reach = np.maximum((0.5 + NEAR) * length, REST)
     distance, _ = starts.query(middle.reshape(-1, x.shape[2]))
     for j, k in np.argwhere(distance.reshape(length.shape) <= reach):  # few: starts lie apart from the paths
-        fine = _curve(path[j], int(k) + 1)
+        fine = _curve(path[j], int(k))
         for start in sorted(starts.query_ball_point(middle[j, k], reach[j, k])):
-            if _miss(fine[:-1], fine[1:], path[start, 0]).min() <= max(TOUCH * length[j, k], REST):
-                return _Return(int(j), int(k) + 1, int(start))
+            own = k == 0 and (path[start, 0] == path[j, 0]).all()
+            if not own and _miss(fine[:-1], fine[1:], path[start, 0]).min() <= max(TOUCH * length[j, k], REST):
+                return _Return(int(j), int(k), int(start))
     return None
 
 

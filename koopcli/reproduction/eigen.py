@@ -225,6 +225,6 @@ METHOD = Method(
         has_effect,
         plant="slips",
         swept=("seeds", "cuts", "mu_scales", "beside"),
-        foreign=("fit-edmd", "baseline", "sample.grid", "sample.box", "test.grid", "test.box"),
+        foreign=("fit-edmd", "baseline", "sample.grid", "sample.box", "sample.ball", "test.box"),
     ),
 )

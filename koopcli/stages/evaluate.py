@@ -35,7 +35,8 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
     ):
         if figures[name]:
             context.warn(f"{figures[name]} of {n} {what}; they are left out of the figures")
-    if not predictor.knows_inputs and np.asarray(trajectories.u[: settings.chunk]).any():
+    blocks = range(0, len(trajectories), settings.chunk)
+    if not predictor.knows_inputs and any(np.asarray(trajectories.u[i : i + settings.chunk]).any() for i in blocks):
         context.warn("the test trajectories have inputs, of which this predictor knows nothing")
     if other := _differing(predictor.plant, trajectories.plant):
         context.warn(f"the test trajectories are of another vehicle or plant than the predictor: {', '.join(other)}")

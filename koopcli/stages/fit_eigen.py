@@ -32,6 +32,7 @@ def _run(settings: FitEigen, inputs: Inputs, context: Context) -> Predictor:
         scaling=settings.scaling,
         cut=settings.cut,
         tabulated=_tabulated(settings, trajectories.dt),
+        lift=settings.lift,
     )
 
 

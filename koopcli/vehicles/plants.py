@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from koopcli.checks import build
 from koopcli.records import Channels, FloatArray
@@ -13,6 +13,10 @@ from koopcli.vehicles.single_track import ForceInput, SlipInput
 
 class Plant(Protocol):
     """A continuous-time system dx/dt = rhs(x, u), vectorised over leading axes."""
+
+    @classmethod
+    def configured(cls, parameters: VehicleParameters, *, force_per: str, v_eps: float) -> Self:
+        """The plant of a vehicle, with those of the options that it has a use for."""
 
     @property
     def parameters(self) -> VehicleParameters:

@@ -85,6 +85,13 @@ def one_line(result, code, *parts):
         (["sample", "ball", "--set", "sample.draw=even"], 2, "'sample.draw' belongs to kind 'grid'"),
         (["fit-eigen", "--set", "vehicle.lateral.E=2"], 3, "'vehicle.lateral.E' must be at most 1, got 2"),
         (["sample", "ellipsoid", "--count", "9"], 3, "'sample.count' must be at least 10"),
+        (["reproduce", "edmd", "--set", "sample.box.count=5"], 2, "changes nothing in reproduce edmd"),
+        (["reproduce", "eigen", "--set", "sample.ball.count=5"], 2, "changes nothing in reproduce eigen"),
+        (
+            ["reproduce", "--set", "fit-eigen.boundary=optimal", "--set", "fit-eigen.centres=7"],
+            2,
+            "'optimal' has no use for it",
+        ),
         (["reproduce", "edmd", "--set", "fit-edmd.basis=states"], 3, "which the basis 'states' has none of"),
         (["reproduce", "--set", "sample.count=2"], 2, "say which, sample.grid.count or sample.ellipsoid.count"),
         (["reproduce", "edmd", "--set", "vehicle.mu_scale=2"], 2, "changes nothing in reproduce edmd"),

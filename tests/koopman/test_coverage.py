@@ -52,6 +52,21 @@ def test_a_grid_is_its_box():
         assert (coverage.outside(x) == expected).all() == (len(states) == len(grid))
 
 
+@pytest.mark.parametrize("limit", [10, 1 << 16])
+def test_a_large_grid_and_a_flat_block_keep_their_corners(limit, monkeypatch):
+    from koopcli.koopman import coverage as module
+
+    monkeypatch.setattr(module, "STATES_LIMIT", limit)
+    values = np.linspace(-1, 1, 12)
+    grid = np.stack(np.meshgrid(values, values, values), axis=-1).reshape(-1, 3)
+    coverage = coverage_of(lambda: [grid], len(grid))
+    assert not coverage.outside(0.99 * grid).any()
+    assert coverage.outside(1.01 * grid[np.abs(grid).max(axis=1) == 1]).all()
+    flat = grid[grid[:, 2] == -1]
+    both = coverage_of(lambda: [flat, grid[::7], grid[::5]], len(flat) + len(grid[::7]) + len(grid[::5]))
+    assert not both.outside(flat).any()
+
+
 def test_states_in_a_plane_fall_back_to_their_box():
     states = np.random.default_rng(3).uniform(-1, 1, (30, 3)) * [1, 1, 0]
     coverage = coverage_of(lambda: [states], len(states))

@@ -127,3 +127,26 @@ def test_where_the_test_states_are(looked_up):
     worst, emptiest = scored.rmse.argsort()[-3:], scored.distance.argsort()[-3:]
     assert figures["worst_in_emptiest"] == pytest.approx(len(set(worst) & set(emptiest)) / 3)
     assert figures["outside"] == scored.outside.sum()
+
+
+def test_the_largest_errors_and_the_share_in_the_domain(pair):
+    predictor, test = pair
+    scored = evaluate(predictor, test, slice(None), 1)
+    predicted = predictor.predict(test.x[:, 0], test.u)
+    assert scored.max_error == pytest.approx(np.abs(predicted - test.x)[:, 1:].max(axis=1))
+    low, high = predictor.coverage.domain
+    inside = ((test.x >= low) & (test.x <= high)).all(axis=2)[:, 1:]
+    assert scored.in_domain == pytest.approx(inside.mean(axis=1))
+    assert 0 < scored.in_domain.mean() < 1
+
+
+def test_diverged_and_undefined_rows_stay_out_of_every_figure(pair):
+    scored = evaluate(*pair, slice(None), 1)
+    lost = np.zeros(50, dtype=bool)
+    lost[scored.rmse.argmax()] = True
+    rmse = np.where(np.arange(50) == scored.rmse.argmin(), np.nan, scored.rmse)
+    figures = replace(scored, diverged=lost, rmse=rmse).figures()
+    assert (figures["diverged"], figures["undefined"]) == (1, 1)
+    assert figures["rmse"]["max"] == np.sort(scored.rmse)[-2]
+    near = replace(scored, diverged=lost, distance=scored.rmse).figures()
+    assert near["worst_in_emptiest"] == 1.0

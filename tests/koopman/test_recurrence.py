@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.recurrence import Surface, check_recurrence, check_starts
+from koopcli.koopman.recurrence import TOUCH, Surface, _miss, check_recurrence, check_starts
 from koopcli.vehicles.single_track import SlipInput
 from tests.conftest import surface_of, trajectories_of
 
@@ -65,9 +65,27 @@ def test_a_start_in_the_middle_of_a_step_is_found_among_others():
         check_recurrence(x, 0.1)
 
 
+def test_the_first_step_counts_too_but_for_its_own_start():
+    x = np.zeros((2, 4, 3))
+    x[0, :, 0] = [0, 1, 2, 3]
+    x[1, :, 0], x[1, :, 2] = 0.5, [0, 5, 10, 15]
+    with pytest.raises(InvalidValueError, match=r"trajectory 0 comes back at 0 s to the initial state of trajectory 1"):
+        check_recurrence(x, 0.1)
+    assert not check_recurrence(x[:1], 0.1)
+
+
+def test_a_bent_path_is_followed_between_its_samples():
+    """The straight way between two samples of a circle misses the start by more than it may."""
+    orbit = circling(1.07, start=1)
+    straight = _miss(orbit[:, 1:-1], orbit[:, 2:], orbit[:, :1]) / np.linalg.norm(orbit[:, 2:] - orbit[:, 1:-1], axis=2)
+    assert straight.min() > TOUCH
+    with pytest.raises(InvalidValueError, match="comes back"):
+        check_recurrence(orbit, 0.01)
+
+
 def test_rest_is_a_return():
     x = np.tile([3.0, 0.0, 0.0], (1, 5, 1))
-    with pytest.raises(InvalidValueError, match=r"comes back at 0\.01 s"):
+    with pytest.raises(InvalidValueError, match=r"comes back at 0(\.01)? s"):
         check_recurrence(x, 0.01)
 
 

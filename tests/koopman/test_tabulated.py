@@ -18,9 +18,7 @@ def parts(request):
 
 @pytest.fixture(params=TABLES)
 def lift(request, parts):
-    from koopcli.koopman.tabulated import Nearest
-
-    return {"nearest": Nearest}[request.param](*parts)
+    return TABLES[request.param](*parts)
 
 
 def test_at_a_tabulated_sample_it_is_the_initial_lifted_state_carried_on(lift, parts):
@@ -51,7 +49,7 @@ def test_observing_is_lifting_and_multiplying(lift):
 
 
 def test_it_survives_storage(lift, parts):
-    again = TABLES[lift.kind](lift.pack(), parts[2])
+    again = TABLES[lift.kind].unpack(lift.pack(), parts[2])
     x = np.random.default_rng(3).uniform(-1, 1, (40, 3))
     assert (again.lift(x) == lift.lift(x)).all()
 

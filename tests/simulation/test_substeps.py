@@ -81,3 +81,25 @@ def test_slower_than_v_eps_stays_finite(vehicle):
     assert np.isfinite(x).all()
     assert not x[0].any()  # at rest it stays
     assert (np.diff(plant.kinetic_energy(x), axis=1) <= 0).all()
+
+
+def test_the_rate_is_the_stiffness_of_the_plant(slips):
+    """Against the eigenvalues of the Jacobian, where nothing can change and the tyres do not saturate."""
+    for v in (0.05, 0.5, 5.0, 30.0):
+        x, u = np.array([[v, 0.0, 0.0]]), np.zeros((1, 4))
+        J = np.stack([(slips.rhs(x + d, u) - slips.rhs(x - d, u))[0] / 2e-7 for d in 1e-7 * np.eye(3)], axis=1)
+        stiffest = np.abs(np.linalg.eigvals(J)).max()
+        rate = slips.fastest_rate(x, u, 0.0)[0]
+        assert stiffest <= rate <= 2.1 * stiffest
+
+
+def test_the_rate_covers_what_the_speeds_can_become(slips):
+    """Never below the rate of a state reached within the sample, at rest for a moment in a spin above all."""
+    sample = ball_of(slips, 300)
+    u = np.zeros((300, 20, 4))
+    fine = simulate(slips.rhs, sample.states, u, 0.01, fastest_rate=finely)
+    foreseen = slips.fastest_rate(fine[:, :-1], u, 0.01)
+    later = slips.fastest_rate(fine[:, 1:], u, 0.0)
+    now = slips.fastest_rate(fine[:, :-1], u, 0.0)
+    assert (foreseen >= 0.999 * np.maximum(now, later)).all()
+    assert (slips.fastest_rate(fine[:, :-1], u, 0.0) < foreseen).mean() > 0.5  # the change within a sample counts
