@@ -42,12 +42,10 @@ class Modes:
     @cached_property
     def generator(self) -> FloatArray:
         """The block of the continuous system, ż = K z, (L, L) in 1/s: real form of the rates, couplings below."""
-        L = len(self.rates)
         K = np.diag(self.rates.real) + np.diag(self.couplings, -1)
         for first in np.flatnonzero(self.rates.imag > 0):
             frequency = self.rates[first].imag
             K[first, first + 1], K[first + 1, first] = -frequency, frequency
-        assert K.shape == (L, L)
         return np.asarray(K)
 
     @cached_property

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from koopcli.checks import build
@@ -24,7 +26,7 @@ def _run(settings: FitEigen, inputs: Inputs, context: Context) -> Predictor:
     _check_surface(x, trajectories, context)
     context.progress(1, 2)
     return eigenfunctions.fit(
-        trajectories,
+        replace(trajectories, x=x),  # not read again
         degree=settings.degree,
         boundary=settings.boundary,
         centres=settings.centres,
