@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from koopcli.config.experiment import Changes, Experiment, flat, load_experiment, parse_set
-from koopcli.config.settings import OF_VEHICLE, UNUSED, FitEdmd, FitEigen
+from koopcli.config.samples import OF_VEHICLE
+from koopcli.config.settings import UNUSED, FitEdmd, FitEigen
 from koopcli.console import Console, show_table
 from koopcli.errors import UnknownNameError, UsageError
 
 if TYPE_CHECKING:
+    from koopcli.config.settings import Simulate
     from koopcli.stages.base import Task
     from koopcli.stages.pipeline import Artefact, Pipeline, Step
 
@@ -44,9 +47,33 @@ class Invocation:
             raise UsageError(f"{text} is made already: {', '.join(fixed)} cannot change it; leave out one or the other")
         return task
 
-    def run(self, task: Task, *, as_json: bool, dry_run: bool, extra: Callable[[Artefact], None] | None = None) -> None:
-        """Make ``task`` and print its name, or print the plan."""
+    def simulated(self, predictor: Task) -> Simulate:
+        """The simulation behind ``predictor``, which remembers it when its trajectories are gone."""
+        from koopcli.stages.recipes import remembered_simulation
+
+        known = predictor.find("simulate")
+        if known is not None:
+            settings: Simulate = known.settings
+            return settings
+        content = self.pipeline.make(predictor).content
+        return remembered_simulation(content.plant, content.dt)
+
+    def run(
+        self,
+        task: Task,
+        *,
+        as_json: bool,
+        dry_run: bool,
+        extra: Callable[[Artefact], None] | None = None,
+        reads: Sequence[str] = (),
+    ) -> None:
+        """Make ``task`` and print its name, or print the plan.
+
+        ``reads``: settings, or beginnings of them, that matter beside those of the stages.
+        """
         for name, _ in flat(self.changes):
+            if any(f"{name}.".startswith(f"{one}.") for one in reads):
+                continue
             if idle := why_idle(name, self.experiment, [task]):
                 raise UsageError(f"{name} changes nothing here: {idle}")
         if dry_run:
@@ -91,6 +118,19 @@ def why_idle(name: str, experiment: Experiment, tasks: Sequence[Task]) -> str | 
     """Why the setting ``name`` has no effect on any of ``tasks``, or None where it has one."""
     section, _, key = name.partition(".")
     behind = [step for task in tasks for step in task.upstream()]
+    stages = {step.stage for step in behind}
+    by_stage = ("simulate", "fit-edmd", "fit-eigen", "baseline", "evaluate")
+    tested = _test_samples(behind)
+    trained = _samples(behind) - tested
+    of_nothing = {
+        **dict.fromkeys(by_stage, section not in stages),
+        **dict.fromkeys(("plot", "reproduce"), True),
+        "sample": not (trained or tested),
+        "test": not tested,
+    }
+    if tasks and of_nothing.get(section) and not (section in ("sample", "test") and "." in key):
+        drawn = tasks[0].stage == "plot"
+        return f"the figure '{tasks[0].settings.figure}' draws nothing of it" if drawn else "nothing is made by it"
     if section in ("vehicle", "simulate"):
         plants = {step.settings.plant for step in behind if step.stage == "simulate"}
         by_energy = any(
@@ -104,8 +144,8 @@ def why_idle(name: str, experiment: Experiment, tasks: Sequence[Task]) -> str | 
         if plants and len(unused) == len(plants):
             return f"the plant '{unused[0]}' has no use for it"
     if section in ("sample", "test") and "." in key:
-        kind, tested = key.partition(".")[0], _test_samples(behind)
-        relevant = tested if section == "test" else {one for one in _samples(behind) if one not in tested} or tested
+        kind = key.partition(".")[0]
+        relevant = tested if section == "test" else trained or tested
         if kind not in {one.settings.kind for one in relevant}:
             return f"no {section} of kind '{kind}' is used"
     fits: dict[str, tuple[FitEdmd | FitEigen, str]] = {
@@ -124,9 +164,15 @@ def _samples(behind: Sequence[Task]) -> set[Task]:
 
 
 def _test_samples(behind: Sequence[Task]) -> set[Task]:
-    """The samples that evaluations among ``behind`` test on."""
-    tests = [dict(step.inputs).get("trajectories") for step in behind if step.stage == "evaluate"]
-    return {sample for test in tests if test is not None for sample in _samples(list(test.upstream()))}
+    """The samples that evaluations and figures among ``behind`` test on."""
+    tests = [
+        task
+        for step in behind
+        if step.stage in ("evaluate", "plot")
+        for role, task in step.inputs
+        if role.rpartition("/")[2] == "trajectories"
+    ]
+    return {sample for test in tests for sample in _samples(list(test.upstream()))}
 
 
 def open_store(store: Path | None) -> tuple[Console, Any]:
@@ -151,6 +197,14 @@ def describe(artefact: Artefact, path: Path) -> dict[str, Any]:
 def print_json(value: object) -> None:
     """One JSON value on stdout; what is not a finite number becomes null."""
     print(json.dumps(_finite(value), indent=1, ensure_ascii=False))
+
+
+def write_csv(content: Any, file: IO[str]) -> None:
+    """The table of an artefact's ``content``."""
+    header, rows = content.table()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
 
 
 def show_plan(steps: Sequence[Step], *, as_json: bool) -> None:

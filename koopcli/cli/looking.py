@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from koopcli.cli.invocation import brief, open_store, print_json
+from koopcli.cli.invocation import brief, open_store, print_json, write_csv
 from koopcli.cli.options import JsonOption, StoreOption, complete_name
 from koopcli.console import Console, show_table
 from koopcli.errors import NewerFormatError, UnknownNameError
@@ -79,7 +78,9 @@ def ls(
 
 def show(
     name: NameArgument,
-    as_csv: Annotated[bool, typer.Option("--csv", help="The per-trajectory table of an evaluation.")] = False,
+    as_csv: Annotated[
+        bool, typer.Option("--csv", help="The table of an evaluation or the numbers of a figure.")
+    ] = False,
     store: StoreOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -89,7 +90,9 @@ def show(
     """
     artefact, task, path = _obtain(name, store)
     if as_csv:
-        _print_csv(artefact)
+        if not hasattr(artefact.content, "table"):
+            raise UnknownNameError(f"{artefact.record.name} has no table; --csv takes an evaluation or a figure")
+        write_csv(artefact.content, sys.stdout)
         return
     record, packed = artefact.record, artefact.content.pack()
     full = {
@@ -208,16 +211,6 @@ def _rows(value: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
             yield name, " ".join(f"{value:.6g}" if isinstance(value, float) else str(value) for value in entry)
         else:
             yield name, f"{entry:.6g}" if isinstance(entry, float) else str(entry)
-
-
-def _print_csv(artefact: Artefact) -> None:
-    table = getattr(artefact.content, "table", None)
-    if table is None:
-        raise UnknownNameError(f"{artefact.record.name} has no table; --csv takes an evaluation")
-    header, rows = table()
-    writer = csv.writer(sys.stdout, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
 
 
 def register(app: typer.Typer) -> None:

@@ -19,19 +19,19 @@ from koopcli.cli.options import (
     names,
 )
 from koopcli.config.experiment import Values
-from koopcli.config.settings import (
+from koopcli.config.samples import (
     BallSample,
     BoxSample,
     Draw,
     EllipsoidSample,
     Excitation,
-    ForcePer,
     GridSample,
     Kind,
     Mesh,
     PlantName,
-    Simulate,
+    PointSample,
 )
+from koopcli.config.settings import ForcePer, Simulate
 
 SAMPLE = ("sample", "vehicle")
 SIMULATE = fitting.DATA
@@ -43,14 +43,16 @@ def sample(
         Kind | None,
         typer.Argument(
             metavar=names(Kind),
-            help="grid: the EDMD dataset (the default); box: test states for it; ellipsoid: Γ, the states of one "
-            "kinetic energy that eigenfunctions start from; ball: test states inside it.",
+            help="grid: the EDMD dataset (the default); box: test states for it; point: one state, the start of the "
+            "paper's trajectory under random inputs; ellipsoid: Γ, the states of one kinetic energy that "
+            "eigenfunctions start from; ball: test states inside it.",
         ),
     ] = None,
     seed: Annotated[
         int | None,
         typer.Option(
-            help=f"Seed of every draw (grid: {GridSample.seed}, box: {BoxSample.seed}, ball: {BallSample.seed})."
+            help=f"Seed of every draw (grid: {GridSample.seed}, box: {BoxSample.seed}, point: {PointSample.seed}, "
+            f"ball: {BallSample.seed})."
         ),
     ] = None,
     count: Annotated[
@@ -64,10 +66,11 @@ def sample(
         Draw | None, typer.Option(metavar=names(Draw), help=f"grid: how values are chosen ({GridSample.draw}).")
     ] = None,
     excitation: Annotated[
-        Excitation | None, typer.Option(metavar=names(Excitation), help=f"box: the inputs ({BoxSample.excitation}).")
+        Excitation | None,
+        typer.Option(metavar=names(Excitation), help=f"box, point: the inputs ({BoxSample.excitation})."),
     ] = None,
     amplitude: Annotated[
-        float | None, typer.Option(help=f"box: inputs within ± amplitude, in N ({BoxSample.amplitude:g}).")
+        float | None, typer.Option(help=f"box, point: inputs within ± amplitude, in N ({BoxSample.amplitude:g}).")
     ] = None,
     energy: Annotated[
         float | None, typer.Option(help=f"ellipsoid, ball: (largest) kinetic energy in J ({EllipsoidSample.energy:g}).")
@@ -79,8 +82,8 @@ def sample(
     steps: Annotated[
         int | None,
         typer.Option(
-            help=f"Steps of each trajectory (box: {BoxSample.steps}, ellipsoid: {EllipsoidSample.steps}, "
-            f"ball: {BallSample.steps})."
+            help=f"Steps of each trajectory (box: {BoxSample.steps}, point: {PointSample.steps}, "
+            f"ellipsoid: {EllipsoidSample.steps}, ball: {BallSample.steps})."
         ),
     ] = None,
     set_: SetOption = None,
@@ -192,14 +195,11 @@ def evaluate(
     call = begin(store, experiment, set_, (*SIMULATE, "fit-edmd", *TEST), {"test": given})
     from koopcli.stages import recipes
 
-    of = None
-    if predictor:
-        of = call.named(predictor, recipes.FITS, "the PREDICTOR", TEST)
+    of = call.named(predictor, recipes.FITS, "the PREDICTOR", TEST) if predictor else None
     elsewhere = [section for section in call.changes if section != "test"]
     test = call.named(on, ["simulate"], "--on", elsewhere) if on else None
-    if of is not None and test is None and of.find("simulate") is None:
-        content = call.pipeline.make(of).content
-        test = recipes.test_set(call.experiment, recipes.remembered_simulation(content.plant, content.dt))
+    if of is not None and test is None:
+        test = recipes.test_set(call.experiment, call.simulated(of))
     call.run(recipes.evaluation(call.experiment, of, test), as_json=as_json, dry_run=dry_run)
 
 

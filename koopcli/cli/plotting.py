@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
 from koopcli.checks import candidates
-from koopcli.cli.invocation import begin, print_json
+from koopcli.cli.invocation import begin, print_json, write_csv
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption, complete_name
 from koopcli.config.experiment import SECTIONS, flat
 from koopcli.config.settings import FigureName, ImageFormat
@@ -17,11 +18,10 @@ from koopcli.console import show_table
 from koopcli.errors import InvalidValueError, StorageError, UnknownNameError, UsageError
 
 if TYPE_CHECKING:
+    from koopcli.figures.registry import FigureKind
     from koopcli.stages.pipeline import Artefact
 
-SWEPT = ("fit-edmd.order", "reproduce.draws", "reproduce.excitations")  # by a figure of several evaluations
-UNREAD = {"edmd": ("fit-eigen", "baseline"), "eigen": ("fit-edmd", "baseline", "reproduce")}  # sections, by method
-INSTEAD = "it sweeps reproduce.orders with sample.draw and test.excitation"
+UNAFFECTED = ("test", "plot")  # what a figure is told beside a named predictor
 
 
 def plot(
@@ -33,6 +33,9 @@ def plot(
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="FILE", help="Write the image: .png, .svg or .pdf."),
+    ] = None,
+    csv_: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE", help="Write the numbers that are drawn, as a table.")
     ] = None,
     list_: Annotated[bool, typer.Option("--list", help="List the figures.")] = False,
     set_: SetOption = None,
@@ -53,31 +56,40 @@ def plot(
     if figure not in get_args(FigureName):
         raise UnknownNameError(f"unknown figure '{figure}'{candidates(figure, get_args(FigureName))}")
     image = _format(output)
-    if output is not None and (output.is_dir() or not os.access(output.parent, os.W_OK)):
-        raise StorageError(f"cannot write {output}: name a file in a folder that can be written to")
+    for path in (output, csv_):
+        if path is not None and (path.is_dir() or not os.access(path.parent, os.W_OK)):
+            raise StorageError(f"cannot write {path}: name a file in a folder that can be written to")
     call = begin(store, experiment, set_, SECTIONS)
     from koopcli.figures.registry import FIGURES
-    from koopcli.stages import recipes
+    from koopcli.stages import drawn
 
+    kind, made = FIGURES[figure], drawn.MADE[FIGURES[figure].made]
+    if artefacts and kind.takes == "nothing":
+        raise UsageError(f"the figure '{figure}' draws no artefact: leave out {' '.join(artefacts)}")
     if artefacts:
-        evaluations = [call.named(name, ["evaluate"], f"what '{figure}' draws", ()) for name in artefacts]
+        told = UNAFFECTED if kind.takes == "predictor" else ()
+        sources = [call.named(one, drawn.TAKES[kind.takes], f"what '{figure}' draws", told) for one in artefacts]
     else:
         for name, _ in flat(call.changes):
-            if FIGURES[figure].several and name in SWEPT:
-                raise UsageError(f"--set {name} changes nothing in the figure '{figure}': {INSTEAD}")
-            if name.partition(".")[0] in UNREAD[FIGURES[figure].method]:
-                raise UsageError(f"--set {name} changes nothing in the figure '{figure}'")
-        evaluations = recipes.drawn_by_default(figure, call.experiment)
+            if f"{name}.".startswith(made.fixed):
+                raise UsageError(f"--set {name} changes nothing in the figure '{figure}': {made.instead}")
+        sources = made.tasks(call.experiment)
 
     def export(artefact: Artefact) -> None:
         if output is not None:
             _write(output, artefact.content.image)
             call.console.note(f"wrote {output}")
-        elif not as_json:
-            call.console.note("add -o FILE.png, .svg or .pdf to write the image")
+        if csv_ is not None:
+            text = StringIO()
+            write_csv(artefact.content, text)
+            _write(csv_, text.getvalue().encode())
+            call.console.note(f"wrote {csv_}")
+        if output is None and csv_ is None and not as_json:
+            call.console.note("add -o FILE.png, .svg or .pdf to write the image, --csv FILE for its numbers")
 
-    task = recipes.figure(figure, evaluations, image)
-    call.run(task, as_json=as_json, dry_run=dry_run, extra=export)
+    task = drawn.figure(figure, sources, image, call.experiment, call.simulated)
+    told_by = [f"plot.{name}" for name in kind.told]
+    call.run(task, as_json=as_json, dry_run=dry_run, extra=export, reads=(*made.reads, *told_by))
 
 
 def _format(output: Path | None) -> ImageFormat:
@@ -105,9 +117,18 @@ def _list(*, as_json: bool) -> None:
     from koopcli.figures.registry import FIGURES
 
     if as_json:
-        print_json({name: kind.about for name, kind in FIGURES.items()})
+        print_json({name: {"shows": kind.about, "takes": kind.takes} for name, kind in FIGURES.items()})
         return
-    show_table(["figure", "shows"], [[name, kind.about] for name, kind in FIGURES.items()], left=2)
+    rows = [[name, kind.about, _takes(kind)] for name, kind in FIGURES.items()]
+    show_table(["figure", "shows", "of"], rows, left=3)
+
+
+def _takes(kind: FigureKind) -> str:
+    """The artefacts that a figure takes, in words."""
+    if kind.takes == "nothing":
+        return "–"
+    what = f"{kind.takes} of kind {' or '.join(kind.kinds)}" if kind.kinds else kind.takes
+    return what if kind.draws == "one" else f"{what}s"
 
 
 def register(app: typer.Typer) -> None:

@@ -9,16 +9,19 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import typer
 
 from koopcli.cli.app import app
-from koopcli.config.settings import BoxSample, Evaluate, FitEdmd, GridSample, Reproduce, Simulate
+from koopcli.config.samples import SAMPLES
+from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, PlotOptions, Reproduce, Simulate
 from koopcli.vehicles.parameters import VehicleParameters
 
 DECLARED: tuple[tuple[str, Any], ...] = (
     ("vehicle", VehicleParameters),
-    ("sample", GridSample),
-    ("test", BoxSample),
+    *((f"sample.{kind}", cls) for kind, cls in SAMPLES.items()),
     ("simulate", Simulate),
     ("fit-edmd", FitEdmd),
+    ("fit-eigen", FitEigen),
+    ("baseline", Baseline),
     ("evaluate", Evaluate),
+    ("plot", PlotOptions),
     ("reproduce", Reproduce),
 )
 
@@ -40,7 +43,8 @@ def _settings() -> Iterator[str]:
     """Every setting that --set and an experiment file take, from the declarations themselves."""
     yield "## Settings\n"
     yield "For `--set SECTION.KEY=VALUE` and for experiment files; values are TOML. `vehicle.name` chooses a vehicle.\n"
-    yield "A sample of kind box takes what `test` takes.\n"
+    yield "`test.box`, `test.point` and `test.ball` take what the samples of those kinds take; a setting written without"
+    yield "its kind, such as `sample.seed`, holds for the kind in use.\n"
     yield "| setting | default | allowed | meaning |\n|---|---|---|---|"
     for section, cls in DECLARED:
         hints = get_type_hints(cls)

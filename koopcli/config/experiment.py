@@ -10,22 +10,24 @@ from typing import Any, TypeVar
 
 from koopcli.checks import COMMAND_LINE, Origin, build, candidates, from_file
 from koopcli.config.data import locate
-from koopcli.config.settings import (
-    OF_VEHICLE,
-    SAMPLES,
-    Baseline,
-    Evaluate,
-    FitEdmd,
-    FitEigen,
-    Reproduce,
-    SampleSettings,
-    Simulate,
-)
+from koopcli.config.samples import OF_VEHICLE, SAMPLES, SampleSettings
+from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, PlotOptions, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, KoopError, UsageError
 from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
 
-SECTIONS = ("vehicle", "sample", "simulate", "fit-edmd", "fit-eigen", "baseline", "test", "evaluate", "reproduce")
-KINDS = {"sample": tuple(SAMPLES), "test": ("box", "ball")}
+SECTIONS = (
+    "vehicle",
+    "sample",
+    "simulate",
+    "fit-edmd",
+    "fit-eigen",
+    "baseline",
+    "test",
+    "evaluate",
+    "plot",
+    "reproduce",
+)
+KINDS = {"sample": tuple(SAMPLES), "test": ("box", "point", "ball")}
 DEFAULT_VEHICLE = "ctu-2020"
 
 T = TypeVar("T")
@@ -52,6 +54,7 @@ class Experiment:
     fit_eigen: FitEigen
     baseline: Baseline
     evaluate: Evaluate
+    plot: PlotOptions
     reproduce: Reproduce
 
     @property
@@ -90,32 +93,40 @@ class Experiment:
         """The test sample of a ``vehicle``, of ``kind`` unless the experiment names one."""
         return self._sampled("test", kind, vehicle)
 
+    def tabled(self, kind: str) -> SampleSettings:
+        """The test sample of a ``kind`` without a vehicle, from its tables alone, whichever kind is in effect."""
+        return self._built("test", kind, {}, self.vehicle)
+
     def _sampled(self, section: str, kind: str, vehicle: VehicleParameters) -> SampleSettings:
         """What applies to the kind in effect: tables of that kind, and settings written outside any table.
 
         The latter hold for the kind that was in effect in their layer; a layer that changes the kind starts afresh.
         """
         before = kind
-        relevant: list[tuple[Layer, Values]] = []
-        for layer in self.layers:
+        loose: dict[int, Values] = {}
+        for i, layer in enumerate(self.layers):
             given = layer.values.get(section, {})
             now = given.get("kind", before)
             if now != before:
-                relevant = []
+                loose = {}
             before = now
-            loose = {key: v for key, v in given.items() if key != "kind" and not isinstance(v, Mapping)}
-            _check_owner(section, now, loose, layer.origin)
-            relevant.append((layer, loose))
-        layers, known = [], {f.name for f in fields(SAMPLES[before])}
-        for layer in self.layers:
-            there = layer.values.get(section, {}).get(before)
+            loose[i] = {key: v for key, v in given.items() if key != "kind" and not isinstance(v, Mapping)}
+            _check_owner(section, now, loose[i], layer.origin)
+        return self._built(section, before, loose, vehicle)
+
+    def _built(
+        self, section: str, kind: str, loose: Mapping[int, Values], vehicle: VehicleParameters
+    ) -> SampleSettings:
+        """The sample of ``kind`` from its tables, and from what stands ``loose`` outside of them, by layer."""
+        layers, known = [], {f.name for f in fields(SAMPLES[kind])}
+        for i, layer in enumerate(self.layers):
+            there = layer.values.get(section, {}).get(kind)
             table = there if isinstance(there, Mapping) else {}  # grid and box samples have a setting "box" too
-            loose = next((values for one, values in relevant if one is layer), {})
-            layers.append(Layer({section: {**table, **loose}}, layer.origin, layer.folder))
+            layers.append(Layer({section: {**table, **loose.get(i, {})}}, layer.origin, layer.folder))
         if set(OF_VEHICLE) <= known:
             body = {name: getattr(vehicle, name) for name in OF_VEHICLE}
             layers = [Layer({section: body}, COMMAND_LINE, Path()), *layers]
-        return _section(SAMPLES[before], section, layers).settled()
+        return _section(SAMPLES[kind], section, layers).settled()
 
 
 def load_experiment(name: str, changes: Changes) -> Experiment:
@@ -143,6 +154,7 @@ def load_experiment(name: str, changes: Changes) -> Experiment:
         fit_eigen=_section(FitEigen, "fit-eigen", layers),
         baseline=_section(Baseline, "baseline", layers),
         evaluate=_section(Evaluate, "evaluate", layers),
+        plot=_section(PlotOptions, "plot", layers),
         reproduce=_section(Reproduce, "reproduce", layers),
     )
 

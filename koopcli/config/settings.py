@@ -2,177 +2,40 @@
 
 The allowed names are literals, so that `koop --help` needs no numerics; a test holds them equal to the registries.
 A stage's settings are part of its key. Whatever does not change a result is not in here (the size of a chunk moves last
-bits), and ``settled`` gives a
-setting that another one switches off its default, so that it is not in the key either.
+bits), and ``settled`` gives a setting that another one switches off its default, so that it is not in the key either.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, Self
+from typing import Literal
 
 from koopcli.checks import setting
-from koopcli.vehicles.parameters import VehicleParameters
+from koopcli.config.samples import SEED_LIMIT, Draw, Excitation, PlantName
+from koopcli.vehicles.parameters import MagicFormula, VehicleParameters
 
-Kind = Literal["grid", "box", "ellipsoid", "ball"]
-Draw = Literal["random", "even"]
-Mesh = Literal["sphere", "fibonacci"]
-Excitation = Literal["none", "fresh", "held"]
-PlantName = Literal["forces", "slips"]
 ForcePer = Literal["axle", "wheel"]
 BasisName = Literal["tensor", "states"]
 Boundary = Literal["thin-plate", "optimal"]
 LiftName = Literal["nearest"]
 Scaling = Literal["raw", "extent"]
 BaselineKind = Literal["hold", "rotation", "linearisation"]
-FigureName = Literal["orders", "error-map", "mean-trajectory"]
+FigureName = Literal[
+    "single-track",
+    "tyre",
+    "orders",
+    "random-input",
+    "energy-surface",
+    "error-map",
+    "error-side",
+    "mean-trajectory",
+    "rmse-histogram",
+    "horizon",
+    "compare",
+    "density",
+    "spectrum",
+]
 ImageFormat = Literal["png", "svg", "pdf"]
-
-INPUTS = {"none": "no input", "fresh": "fresh inputs", "held": "held inputs"}  # kinds of excitation in words
-BOX = (30.0, 30.0, 10.0)
-ENERGY = 500e3
-SEED_LIMIT = 2**63 - 1
-LARGEST = 1e12  # of any physical quantity: squares and sums of it stay far inside the floating-point range
-
-
-class Sampled:
-    """What every kind of sample tells of itself; a kind says only what is different."""
-
-    count: int
-    steps: int
-
-    @property
-    def trajectories(self) -> int:
-        """How many trajectories start from the sample."""
-        return self.count
-
-    @property
-    def horizon(self) -> int:
-        """Steps of each trajectory unless told otherwise."""
-        return self.steps
-
-    @property
-    def input_steps(self) -> int | None:
-        """Steps that the sample holds inputs for, None for any number."""
-        return None
-
-    @property
-    def numbers(self) -> int:
-        """How many numbers the sample stores."""
-        return 7 * self.count
-
-    def settled(self) -> Self:
-        """The same sample with what does not matter at its default: one sample, one key."""
-        return self
-
-
-@dataclass(frozen=True)
-class GridSample(Sampled):
-    """The EDMD dataset: every state of a grid with every input column."""
-
-    kind: Literal["grid"] = "grid"
-    seed: int = setting(0, low=0, high=SEED_LIMIT, help="seed of every draw")
-    count: int = setting(15, low=1, high=10_000, help="values per state")
-    draw: Draw = setting("random", help="how the values of a state are chosen")
-    box: tuple[float, ...] = setting(BOX, low=1e-6, high=LARGEST, help="half-width per state: m/s, m/s, rad/s")
-    levels: tuple[float, ...] = setting((1.0, 5.0, 10.0, 100.0), low=0, high=LARGEST, unit="N", help="input ranges F_m")
-    columns: int = setting(15, low=1, high=100_000, help="input columns per range")
-
-    @property
-    def trajectories(self) -> int:
-        """How many trajectories start from the sample."""
-        return int(self.count ** len(self.box)) * len(self.levels) * self.columns
-
-    @property
-    def horizon(self) -> int:
-        """Steps of each trajectory unless told otherwise."""
-        return 1
-
-    @property
-    def numbers(self) -> int:
-        """How many numbers the sample stores."""
-        return self.count * len(self.box) + 4 * len(self.levels) * self.columns
-
-
-@dataclass(frozen=True)
-class BoxSample(Sampled):
-    """Test states uniform in a box, with inputs."""
-
-    kind: Literal["box"] = "box"
-    seed: int = setting(7, low=0, high=SEED_LIMIT, help="seed of every draw")
-    count: int = setting(3375, low=1, high=100_000_000, help="number of states")
-    excitation: Excitation = setting("fresh", help="inputs: none, fresh at each step, or held")
-    amplitude: float = setting(1e4, low=0, high=LARGEST, unit="N", help="inputs are uniform in ± amplitude")
-    steps: int = setting(30, low=1, high=1_000_000, help="steps of each trajectory")
-    box: tuple[float, ...] = setting(BOX, low=1e-6, high=LARGEST, help="half-width per state: m/s, m/s, rad/s")
-
-    @property
-    def input_steps(self) -> int | None:
-        """Steps that the sample holds inputs for, None for any number."""
-        return self.steps if self.excitation == "fresh" else None
-
-    @property
-    def numbers(self) -> int:
-        """How many numbers the sample stores."""
-        return self.count * (len(self.box) + 4 * (self.input_steps or 1))
-
-    def settled(self) -> BoxSample:
-        """The same sample with the amplitude that does not matter at zero: one sample, one key."""
-        return replace(self, amplitude=0.0) if self.excitation == "none" else self
-
-
-@dataclass(frozen=True, kw_only=True)
-class EllipsoidSample(Sampled):
-    """Γ: states of one kinetic energy, the surface that trajectories of the eigenfunction method start from."""
-
-    kind: Literal["ellipsoid"] = "ellipsoid"
-    mesh: Mesh = setting("sphere", help="points on the surface: latitudes × longitudes, or a spiral")
-    count: int = setting(441, low=10, high=1_000_000, help="number of states; a square for the mesh 'sphere'")
-    energy: float = setting(ENERGY, above=0, high=LARGEST, unit="J", help="kinetic energy")
-    steps: int = setting(150, low=1, high=1_000_000, help="steps of each trajectory")
-    m: float
-    Jzz: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class BallSample(Sampled):
-    """Test states uniform in the volume inside Γ, without inputs."""
-
-    kind: Literal["ball"] = "ball"
-    seed: int = setting(0, low=0, high=SEED_LIMIT, help="seed of every draw")
-    count: int = setting(2000, low=1, high=100_000_000, help="number of states")
-    energy: float = setting(ENERGY, above=0, high=LARGEST, unit="J", help="largest kinetic energy")
-    steps: int = setting(50, low=1, high=1_000_000, help="steps of each trajectory")
-    m: float
-    Jzz: float
-
-
-SampleSettings = GridSample | BoxSample | EllipsoidSample | BallSample
-
-SAMPLES: dict[str, type[GridSample] | type[BoxSample] | type[EllipsoidSample] | type[BallSample]] = {
-    "grid": GridSample,
-    "box": BoxSample,
-    "ellipsoid": EllipsoidSample,
-    "ball": BallSample,
-}
-OF_VEHICLE = ("m", "Jzz")  # what a sample by kinetic energy takes from the vehicle
-
-
-@dataclass(frozen=True)
-class Custom:
-    """What is done with a plant unless told otherwise: kinds of training and test sample, first scored sample k."""
-
-    training: Kind
-    test: Kind
-    first: int
-
-
-CUSTOMS: dict[str, Custom] = {
-    "forces": Custom("grid", "box", first=1),  # the states are observables, so k = 0 is exact
-    "slips": Custom("ellipsoid", "ball", first=0),  # k = 0 is an approximation already
-}
-
-SAMPLED_FOR: dict[str, PlantName] = {"grid": "forces", "box": "forces", "ellipsoid": "slips", "ball": "slips"}
 
 
 @dataclass(frozen=True)
@@ -265,20 +128,40 @@ class Evaluate:
 
 @dataclass(frozen=True)
 class Series:
-    """What one evaluation is in a figure: the ``label`` of what it belongs to, and the order of its basis."""
+    """What one of several artefacts is called in a figure, and the order of its basis where it is drawn against it."""
 
     label: str
-    order: int | None
+    order: int | None = None
+
+
+@dataclass(frozen=True)
+class Tyres:
+    """What a figure draws of a vehicle's tyres: ``loads`` of a front and of a rear wheel in N, and its formulas."""
+
+    label: str
+    loads: tuple[float, ...]
+    mu_scale: float
+    lateral: MagicFormula
+    longitudinal: MagicFormula
+
+
+@dataclass(frozen=True)
+class PlotOptions:
+    """What figures can be told."""
+
+    restart: int = setting(50, low=1, high=1_000_000, help="random-input: steps until the prediction starts afresh")
 
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure, what it draws of each input, and the digest of the code that draws it."""
+    """A figure, what it is told beside its inputs, and the digest of the code that draws it."""
 
     figure: FigureName
     format: ImageFormat
-    series: tuple[Series, ...]
     drawn_by: str
+    series: tuple[Series, ...] = setting((), empty=True)
+    tyres: tuple[Tyres, ...] = setting((), empty=True)
+    restart: int | None = None
 
 
 @dataclass(frozen=True)

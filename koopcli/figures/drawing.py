@@ -4,10 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import zip_longest
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from koopcli.records import Array, FloatArray, Packed
+from koopcli.config.settings import Plot, Series
+from koopcli.errors import InvalidValueError
+from koopcli.records import Array, BoolArray, Channels, FloatArray, Packed
+
+
+@dataclass(frozen=True)
+class Source:
+    """One drawn artefact: what it is called among several, and the records of it and of what it was made from."""
+
+    label: str
+    order: int | None
+    records: Mapping[str, Any]
+
+
+def sources_of(settings: Plot, inputs: Mapping[str, Any]) -> list[Source]:
+    """The drawn artefacts from records by ``number/role``."""
+    records: dict[int, dict[str, Any]] = {}
+    for name, record in inputs.items():
+        number, _, role = name.partition("/")
+        records.setdefault(int(number), {})[role] = record
+    series = settings.series or (Series(""),) * len(records)
+    return [Source(one.label, one.order, records[i]) for i, one in enumerate(series)]
 
 
 @dataclass(frozen=True)
@@ -18,6 +42,12 @@ class Drawing:
     format: str
     numbers: Mapping[str, Array]
     image: bytes
+
+    def table(self) -> tuple[list[str], list[list[Any]]]:
+        """The numbers as a table: column names with units, and rows; short columns end in empty cells."""
+        columns = [array.values[...].tolist() for array in self.numbers.values()]
+        header = [f"{name} ({array.units})" for name, array in self.numbers.items()]
+        return header, [list(row) for row in zip_longest(*columns, fillvalue="")]
 
     def pack(self) -> Packed:
         """The drawing for storage."""
@@ -41,6 +71,20 @@ class Drawing:
         )
 
 
-def column(values: FloatArray, axis: str, unit: str) -> Array:
+def column(values: npt.ArrayLike, axis: str, unit: str) -> Array:
     """One drawn column."""
-    return Array(values, (axis,), unit)
+    return Array(np.asarray(values, dtype=float), (axis,), unit)
+
+
+def state_columns(x: FloatArray, channels: Channels, axis: str, name: str = "{}") -> dict[str, Array]:
+    """States (n, n_x) as a column each, called ``name`` with the state's own in place of the braces."""
+    named = zip(channels.names, channels.units, strict=True)
+    return {name.format(state): column(x[:, i], axis, unit) for i, (state, unit) in enumerate(named)}
+
+
+def any_error(rmse: FloatArray, diverged: BoolArray) -> BoolArray:
+    """Which trajectories (n,) have an error to draw. Raises ``InvalidValueError`` where none has."""
+    shown = np.isfinite(rmse) & ~diverged
+    if not shown.any():
+        raise InvalidValueError("every prediction of this evaluation diverged: there is no error to draw")
+    return np.asarray(shown)

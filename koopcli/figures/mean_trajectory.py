@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from koopcli.config.settings import Series
-from koopcli.errors import InvalidValueError
-from koopcli.figures.drawing import Drawing, column
-from koopcli.figures.style import COLOURS, COLUMN, axis_label, render, style
-from koopcli.koopman.evaluation import Evaluation, Forecaster
+from koopcli.config.settings import Plot
+from koopcli.figures.drawing import Source, any_error, column, state_columns
+from koopcli.figures.style import COLOURS, COLUMN, axis_label, style
 from koopcli.records import Array, Channels, FloatArray, Trajectories
 
 
@@ -29,11 +26,12 @@ class MeanTrajectory:
     channels: Channels
 
 
-def mean_trajectory(evaluation: Evaluation, predictor: Forecaster, test: Trajectories) -> MeanTrajectory:
+def select(sources: Sequence[Source], settings: Plot) -> MeanTrajectory:
     """What the figure shows. Raises ``InvalidValueError`` where every prediction diverged."""
-    rmse = np.where(evaluation.diverged, np.nan, evaluation.rmse)
-    if not np.isfinite(rmse).any():
-        raise InvalidValueError("every prediction of this evaluation diverged: there is no mean error to draw")
+    records = sources[0].records
+    evaluation, predictor, test = records["evaluation"], records["predictor"], records["trajectories"]
+    assert isinstance(test, Trajectories)
+    rmse = np.where(any_error(evaluation.rmse, evaluation.diverged), evaluation.rmse, np.nan)
     mean = float(np.nanmean(rmse))
     j = int(np.nanargmin(np.abs(rmse - mean)))
     true = np.asarray(test.x[j : j + 1])
@@ -42,14 +40,11 @@ def mean_trajectory(evaluation: Evaluation, predictor: Forecaster, test: Traject
     return MeanTrajectory(time, true[0], predicted[0], float(rmse[j]), mean, test.state_channels)
 
 
-def drawing(series: Sequence[Series], inputs: Mapping[str, Any], image: str) -> Drawing:
-    """The figure with its numbers."""
-    shown = mean_trajectory(inputs["0/evaluation"], inputs["0/predictor"], inputs["0/trajectories"])
-    numbers: dict[str, Array] = {"time": column(shown.time, "sample", "s")}
-    for i, (name, unit) in enumerate(zip(shown.channels.names, shown.channels.units, strict=True)):
-        numbers[f"{name}/true"] = column(shown.true[:, i], "sample", unit)
-        numbers[f"{name}/predicted"] = column(shown.predicted[:, i], "sample", unit)
-    return Drawing("mean-trajectory", image, numbers, render(draw(shown), image))
+def numbers(shown: MeanTrajectory) -> Mapping[str, Array]:
+    """Time, and every state true and predicted."""
+    true = state_columns(shown.true, shown.channels, "sample", "{}/true")
+    predicted = state_columns(shown.predicted, shown.channels, "sample", "{}/predicted")
+    return {"time": column(shown.time, "sample", "s"), **true, **predicted}
 
 
 def draw(shown: MeanTrajectory) -> Figure:

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
-from koopcli.config.settings import Series
-from koopcli.figures.drawing import Drawing, column
-from koopcli.figures.style import COLOURS, COLUMN, MARKERS, PAPER, render, style
+from koopcli.config.settings import Plot
+from koopcli.errors import InvalidValueError
+from koopcli.figures.drawing import Source, column
+from koopcli.figures.style import COLOURS, COLUMN, MARKERS, PAPER, plain_numbers, style
 from koopcli.records import Array, FloatArray
 
 
@@ -30,36 +30,40 @@ class OrderErrors:
     maximum: FloatArray
 
 
-def curves(series: Sequence[Series], inputs: Mapping[str, Any]) -> list[OrderErrors]:
-    """Evaluations grouped by label, each group by rising order."""
+def select(sources: Sequence[Source], settings: Plot) -> list[OrderErrors]:
+    """Evaluations grouped by label, each group by rising order.
+
+    Raises ``InvalidValueError`` where every prediction of every evaluation diverged.
+    """
     groups: dict[str, list[tuple[int, dict[str, float]]]] = {}
-    for i, one in enumerate(series):
-        score = inputs[f"{i}/evaluation"].figures()["rmse"]
-        groups.setdefault(one.label, []).append((one.order or 0, score))
+    for source in sources:
+        score = source.records["evaluation"].figures()["rmse"]
+        groups.setdefault(source.label, []).append((source.order or 0, score))
     found = []
     for label, members in groups.items():
         ordered = sorted(members, key=lambda member: member[0])
         order = np.array([order for order, _ in ordered])
         statistics = (np.array([score[name] for _, score in ordered]) for name in ("mean", "median", "max"))
         found.append(OrderErrors(label, order, *statistics))
+    if not any(np.isfinite(curve.mean).any() for curve in found):
+        raise InvalidValueError("every prediction of these evaluations diverged: there is no error to draw")
     return found
 
 
-def drawing(series: Sequence[Series], inputs: Mapping[str, Any], image: str) -> Drawing:
-    """The figure with its numbers."""
-    drawn = curves(series, inputs)
-    numbers: dict[str, Array] = {}
-    for curve in drawn:
-        numbers[f"{curve.label}/order"] = column(curve.order.astype(float), "order", "1")
+def numbers(curves: Sequence[OrderErrors]) -> Mapping[str, Array]:
+    """Order, mean, median and maximum of each curve."""
+    found: dict[str, Array] = {}
+    for curve in curves:
+        found[f"{curve.label}/order"] = column(curve.order, "order", "1")
         for statistic in ("mean", "median", "maximum"):
-            numbers[f"{curve.label}/{statistic}"] = column(getattr(curve, statistic), "order", "%")
-    return Drawing("orders", image, numbers, render(draw(drawn), image))
+            found[f"{curve.label}/{statistic}"] = column(getattr(curve, statistic), "order", "%")
+    return found
 
 
 def draw(curves: Sequence[OrderErrors]) -> Figure:
     """Mean, median and maximum of one curve; of several only the means, one colour each."""
     with style():
-        figure = Figure(figsize=(COLUMN, 2.6), layout="constrained")
+        figure = Figure(figsize=(COLUMN, 2.7), layout="constrained")
         axes = figure.subplots()
         for curve, colour, marker in zip(curves, cycle(COLOURS), cycle(MARKERS), strict=False):
             if len(curves) == 1:
@@ -70,9 +74,9 @@ def draw(curves: Sequence[OrderErrors]) -> Figure:
                 axes.plot(curve.order, curve.mean, marker=marker, color=colour, label=curve.label)
         points = [BEST_RMSE] * len(BEST_ORDERS)
         label = f"paper's best ({BEST_RMSE} %)"
-        axes.plot(BEST_ORDERS, points, "x", color=PAPER, markersize=6, label=label)
+        axes.plot(BEST_ORDERS, points, "x", color=PAPER, markersize=6, markeredgewidth=1.4, label=label, zorder=5)
         axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        plain_numbers(axes.yaxis)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_xlabel("order of the polynomial basis")
         axes.set_ylabel("RMSE (%)")

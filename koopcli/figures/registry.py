@@ -1,53 +1,115 @@
-"""Figures by name. A new figure is one file with ``drawing`` and one line here; matplotlib waits until one is drawn."""
+"""Figures by name. A new figure is one file and one line here; matplotlib waits until one is drawn.
+
+The file ``koopcli/figures/<name>.py`` has three functions: ``select(sources, settings)`` gathers what the figure shows
+in a small record, ``numbers(shown)`` gives that as columns, ``draw(shown)`` as a matplotlib figure.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, Literal
 
-from koopcli.config.settings import Series
-from koopcli.figures.drawing import Drawing
+from koopcli.config.settings import Plot
+from koopcli.figures.drawing import Drawing, sources_of
+
+Takes = Literal["evaluation", "predictor", "fit", "sample", "nothing"]
 
 
 @dataclass(frozen=True)
 class FigureKind:
-    """A figure: what it shows in a line, the module that draws it, and what it takes.
+    """A figure: what it shows in a line, and what it takes.
 
-    ``roles``: of each evaluation, itself or what it was made from: ``evaluation``, ``predictor``, ``trajectories``
-    (the test set), ``training``. ``several``: whether it draws more than one evaluation; ``method`` makes the
-    predictors when no evaluation is named.
+    ``takes``: the artefacts it draws, a ``fit`` being a predictor with lifted states; ``roles``: of each artefact,
+    itself or what it was made from: ``evaluation``, ``predictor``, ``trajectories`` (the test set), ``training``,
+    ``sample``. ``made``: what it makes when none is named, one of ``koopcli.stages.drawn.MADE``. ``draws``: one
+    artefact, several ``beside`` one another on one test set, or several as ``points`` of curves against the order.
+    ``kinds``: of a sample, those it may be of. ``told``: fields of ``Plot`` that it uses.
     """
 
     about: str
-    module: str
+    takes: Takes
     roles: tuple[str, ...]
-    several: bool
-    method: str
-
-    def draw(self, series: Sequence[Series], inputs: Mapping[str, Any], image: str) -> Drawing:
-        """The figure from records by ``number/role``, with a ``series`` entry for each evaluation."""
-        drawn: Drawing = import_module(f"koopcli.figures.{self.module}").drawing(series, inputs, image)
-        return drawn
+    made: str
+    draws: Literal["one", "beside", "points"] = "one"
+    kinds: tuple[str, ...] = ()
+    told: tuple[str, ...] = ()
 
 
 FIGURES: dict[str, FigureKind] = {
-    "orders": FigureKind(
-        "RMSE against the order of the basis: mean, median, maximum", "orders", ("evaluation",), True, "edmd"
+    "single-track": FigureKind("the vehicle: states, forces and angles with their signs", "nothing", (), "nothing"),
+    "tyre": FigureKind(
+        "tyre forces against slip, of the vehicle and of those shown beside it",
+        "nothing",
+        (),
+        "vehicles",
+        told=("tyres",),
     ),
-    "error-map": FigureKind(
-        "RMSE by initial state in two planes, over the training trajectories",
-        "error_map",
+    "orders": FigureKind(
+        "RMSE against the order of the basis, beside the paper's best",
+        "evaluation",
+        ("evaluation",),
+        "orders",
+        draws="points",
+    ),
+    "random-input": FigureKind(
+        "one trajectory under random inputs, true and predicted, with restarts",
+        "predictor",
+        ("predictor", "trajectories"),
+        "edmd-fit",
+        told=("restart",),
+    ),
+    "energy-surface": FigureKind(
+        "Γ, the surface of one kinetic energy, with its initial states",
+        "sample",
+        ("sample",),
+        "surface",
+        kinds=("ellipsoid",),
+    ),
+    "error-map": FigureKind("RMSE by initial state, in space and from above", "evaluation", ("evaluation",), "eigen"),
+    "error-side": FigureKind(
+        "RMSE by initial state from the side, over the training trajectories",
+        "evaluation",
         ("evaluation", "training"),
-        False,
         "eigen",
     ),
     "mean-trajectory": FigureKind(
-        "the test trajectory whose RMSE is nearest the mean: true and predicted states",
-        "mean_trajectory",
+        "the test trajectory whose RMSE is nearest the mean, true and predicted",
+        "evaluation",
         ("evaluation", "predictor", "trajectories"),
-        False,
         "eigen",
     ),
+    "rmse-histogram": FigureKind(
+        "how the RMSE of the trajectories is distributed", "evaluation", ("evaluation",), "eigen", draws="beside"
+    ),
+    "horizon": FigureKind(
+        "error against time, of one predictor or of several on one test set",
+        "evaluation",
+        ("evaluation", "predictor", "trajectories"),
+        "beside",
+        draws="beside",
+    ),
+    "compare": FigureKind(
+        "the errors of several predictors on one test set, side by side",
+        "evaluation",
+        ("evaluation",),
+        "beside",
+        draws="beside",
+    ),
+    "density": FigureKind(
+        "RMSE against the distance of the initial state to the data", "evaluation", ("evaluation",), "eigen"
+    ),
+    "spectrum": FigureKind(
+        "eigenvalues of a predictor beside the unit circle and the half plane", "fit", ("predictor",), "edmd-fit"
+    ),
 }
+
+
+def drawing(settings: Plot, inputs: Mapping[str, Any]) -> Drawing:
+    """The figure that ``settings`` ask for, from records by ``number/role``."""
+    from koopcli.figures.style import render  # noqa: PLC0415  (matplotlib only when something is drawn)
+
+    module = import_module(f"koopcli.figures.{settings.figure.replace('-', '_')}")
+    shown = module.select(sources_of(settings, inputs), settings)
+    return Drawing(settings.figure, settings.format, module.numbers(shown), render(module.draw(shown), settings.format))

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from typing import Any
 
 import matplotlib as mpl
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from mpl_toolkits.mplot3d import Axes3D
 
 COLUMN = 3.5  # inches, one column of a two-column page
 
 # Okabe and Ito's palette: distinct to every common form of colour vision
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MARKERS = ("o", "s", "^", "D", "v", "P")
+DASHES = ("-", "--", ":")
 PAPER = "#000000"
 TRAINING = "#bbbbbb"
+GUIDE = "#888888"  # what is not data: axes through zero, the unit circle, restarts
+NARROW = 200  # ratio of the ends of a logarithmic axis below which 2 and 5 are written too
 SHADES = "viridis_r"  # even in lightness, dark where errors are large
 
 STYLE = {
@@ -36,6 +44,34 @@ STYLE = {
     "svg.hashsalt": "koop",
     "svg.fonttype": "none",
 }
+
+
+def looks(count: int) -> list[dict[str, Any]]:
+    """Colour and dashes of each of ``count`` lines, all different up to three times the colours."""
+    return [
+        {"color": COLOURS[i % len(COLOURS)], "linestyle": DASHES[i // len(COLOURS) % len(DASHES)]} for i in range(count)
+    ]
+
+
+def plain_numbers(axis: Axis) -> None:
+    """Numbers on a logarithmic axis as people write them, 0.1 and 20 rather than powers of ten."""
+    low, high = axis.get_view_interval()
+    if high < NARROW * low:
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def in_space(axes: Axes3D, names: Sequence[str]) -> None:
+    """Labels, the point of view and the box of axes in space, so that nothing is cut off at one column."""
+    axes.view_init(elev=24, azim=-58)
+    axes.set_box_aspect((1, 1, 0.85), zoom=0.95)
+    for axis, name in zip((axes.xaxis, axes.yaxis, axes.zaxis), names, strict=False):
+        axis.set_label_text(name)
+        axis.labelpad = -6 if axis is axes.zaxis else -7
+        axis.set_tick_params(pad=-2)
+        axis.pane.set_facecolor("white")
+        axis.set_major_locator(MaxNLocator(4))
 
 
 def axis_label(name: str, unit: str) -> str:

@@ -8,11 +8,12 @@ from functools import partial
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
-from koopcli.config.settings import INPUTS, BoxSample, GridSample, ImageFormat
+from koopcli.config.samples import INPUTS, BoxSample, GridSample
+from koopcli.config.settings import ImageFormat
 from koopcli.errors import InvalidValueError
 from koopcli.records import Meta
 from koopcli.reproduction.report import REDUCED, Method, Picture, Run, Table, count_text, has_effect, score_text
-from koopcli.stages import recipes
+from koopcli.stages import drawn, recipes
 from koopcli.stages.base import Task
 
 NOTES = (
@@ -58,7 +59,7 @@ def pictures(run: Run, image: ImageFormat) -> list[Picture]:
     plan = run.experiment.reproduce
     excitation = "fresh" if "fresh" in plan.excitations else plan.excitations[0]
     chosen = [t for c, t in cells(run.experiment) if (c.draw, c.excitation) == (plan.draws[0], excitation)]
-    return [Picture(recipes.figure("orders", chosen, image), f"RMSE against order, {run.label}")]
+    return [Picture(drawn.figure("orders", chosen, image, run.experiment), f"RMSE against order, {run.label}")]
 
 
 def notes(runs: Sequence[Run]) -> list[str]:

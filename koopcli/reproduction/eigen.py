@@ -9,7 +9,8 @@ from typing import Any
 
 from koopcli.config.experiment import DEFAULT_VEHICLE, Experiment, vehicle_named
 from koopcli.config.paper import EIGEN_RMSE
-from koopcli.config.settings import BallSample, EllipsoidSample, FitEigen, ImageFormat, Simulate
+from koopcli.config.samples import BallSample, EllipsoidSample
+from koopcli.config.settings import FitEigen, ImageFormat, Simulate
 from koopcli.records import Meta
 from koopcli.reproduction.eigen_cells import (
     BASELINES,
@@ -33,7 +34,7 @@ from koopcli.reproduction.report import (
     has_effect,
     score_text,
 )
-from koopcli.stages import recipes
+from koopcli.stages import drawn
 
 SIZES = (count_text(EllipsoidSample.count), count_text(BallSample.count, BallSample.steps))  # the paper's
 
@@ -42,8 +43,11 @@ def pictures(run: Run, image: ImageFormat) -> list[Picture]:
     """Where the errors of the headline are, and what its mean error looks like."""
     headline = evaluated(run.experiment, run.experiment.fit_eigen, run.experiment.reproduce.seeds[0])
     return [
-        Picture(recipes.figure("error-map", [headline], image), f"RMSE by initial state, {run.label}"),
-        Picture(recipes.figure("mean-trajectory", [headline], image), f"A trajectory of mean RMSE, {run.label}"),
+        Picture(drawn.figure("error-map", [headline], image, run.experiment), f"RMSE by initial state, {run.label}"),
+        Picture(
+            drawn.figure("mean-trajectory", [headline], image, run.experiment),
+            f"Mean RMSE, {run.label}",
+        ),
     ]
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
 
 from koopcli.config.experiment import Experiment
-from koopcli.config.settings import BallSample, Baseline, EllipsoidSample, FitEdmd, FitEigen
+from koopcli.config.samples import BallSample, EllipsoidSample
+from koopcli.config.settings import FitEigen
 from koopcli.errors import InvalidValueError
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
+from koopcli.stages.makers import prospect
 from koopcli.vehicles.single_track import G
 
 CUT = 1e-10  # of the readings with optimal boundary functions
@@ -19,7 +20,6 @@ PEAK = 7800.0  # N, a peak force that does not follow the load
 LITERAL_STEPS, LITERAL_TABLE = 1.0, 0.5  # s: "T = 1 s" taken as all that is simulated
 CENTRES = (382, 441, 1000)  # distinct initial states, all of them, and many
 FEW_CENTRES = 100
-EDMD_ORDERS = (3, 5)
 HEADLINE, READINGS, CUTS, GRIP, BASELINES = "headline", "readings", "cuts", "grip", "baselines"
 
 
@@ -37,7 +37,7 @@ def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
     """Every cell of the experiment with its evaluation."""
     plan, main = experiment.reproduce, experiment.vehicle_name
     first = plan.seeds[0]
-    everywhere = _everywhere(experiment)
+    everywhere = recipes.vehicles(experiment)
     as_given = experiment.fit_eigen
     splines = FitEigen(tabulate=as_given.tabulate)  # a row means what it says, whatever the experiment changes
     optimal = replace(splines, boundary="optimal")
@@ -75,21 +75,8 @@ def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
             yield Cell(GRIP, f"grip × {scale:g}", vehicle, first), evaluated(gripping, as_given, first)
             label, fit = f"grip × {scale:g}, optimal{cut_text(CUT)}", replace(optimal, cut=CUT)
             yield Cell(GRIP, label, vehicle, first), evaluated(gripping, fit, first)
-        for label, predictor in _baselines(there):
-            yield Cell(BASELINES, label, vehicle, first), _scored(there, predictor, first)
-
-
-def _everywhere(experiment: Experiment) -> list[tuple[str, Experiment]]:
-    """The experiment's own vehicle and those beside it, each under a name of its own; the same one only once."""
-    found = [(experiment.vehicle_name, experiment)]
-    for name in experiment.reproduce.beside:
-        there = experiment.with_vehicle(name)
-        label = Path(name).stem
-        if any(label == known for known, _ in found):
-            label = f"{label} as its file has it"
-        if all(there.vehicle != one.vehicle for _, one in found):
-            found.append((label, there))
-    return found
+        for predictor in recipes.beside(there, _training(there)):
+            yield Cell(BASELINES, prospect(predictor).name, vehicle, first), _scored(there, predictor, first)
 
 
 def evaluated(experiment: Experiment, fit: FitEigen, seed: int, seconds: float | None = None) -> Task:
@@ -99,21 +86,6 @@ def evaluated(experiment: Experiment, fit: FitEigen, seed: int, seconds: float |
         simulate = replace(simulate, steps=max(1, round(seconds / simulate.dt)))
     there = replace(experiment, fit_eigen=fit, simulate=simulate)
     return _scored(there, recipes.fit_eigen(there, _training(there)), seed)
-
-
-def _baselines(experiment: Experiment) -> Iterator[tuple[str, Task]]:
-    training = _training(experiment)
-    labels = {
-        "hold": "hold the first state",
-        "rotation": "rotation at the first yaw rate",
-        "linearisation": "linearisation at the first state",
-    }
-    for kind, label in labels.items():
-        there = replace(experiment, baseline=Baseline(kind))  # type: ignore[arg-type]
-        yield label, recipes.baseline(there, training)
-    yield "DMD", recipes.fit_edmd(replace(experiment, fit_edmd=FitEdmd(basis="states")), training)
-    for order in EDMD_ORDERS:
-        yield f"EDMD, order {order}", recipes.fit_edmd(replace(experiment, fit_edmd=FitEdmd(order=order)), training)
 
 
 def _training(experiment: Experiment) -> Task:

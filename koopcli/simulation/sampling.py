@@ -97,7 +97,15 @@ def box(
     """
     generator = np.random.default_rng(seed)
     states = generator.uniform(-1, 1, (count, len(box))) * np.asarray(box)
+    return states, excite(generator, excitation, amplitude, count, steps, inputs)
+
+
+def excite(
+    generator: np.random.Generator, excitation: str, amplitude: float, count: int, steps: int, inputs: int
+) -> FloatArray:
+    """Inputs (count, steps or 1, inputs) of ``count`` trajectories, uniform in [-amplitude, amplitude] or zero."""
     if excitation == "none":
-        return states, np.zeros((count, 1, inputs))
+        return np.zeros((count, 1, inputs))
     held_steps = steps if excitation == "fresh" else 1
-    return states, amplitude * generator.uniform(-1, 1, (count, held_steps, inputs))
+    drawn: FloatArray = amplitude * generator.uniform(-1, 1, (count, held_steps, inputs))
+    return drawn

@@ -105,13 +105,14 @@ class Task:
 
 @dataclass(frozen=True)
 class Prospect:
-    """What is known of a predictor before it is made: its lifted states, the steps it may be asked for, and what a
-    figure calls it, with the order that it may be drawn against.
+    """What is known of a predictor before it is made: its lifted states, the steps it may be asked for, and its
+    ``name``; the ``data`` and ``order`` of one that is a point of a curve against the order.
     """
 
     functions: int
     horizon: int | None
-    label: str
+    name: str
+    data: str = ""
     order: int | None = None
 
 

@@ -9,6 +9,12 @@ from koopcli.koopman.edmd import coverage
 from koopcli.records import Trajectories
 from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage
 
+NAMES = {
+    "hold": "hold the first state",
+    "rotation": "rotation at the first yaw rate",
+    "linearisation": "linearisation at the first state",
+}
+
 
 def _run(settings: Baseline, inputs: Inputs, context: Context) -> Forecast:
     t: Trajectories = inputs["trajectories"]
@@ -25,5 +31,5 @@ STAGE = Stage(
     describe=lambda f: f"{f['kind']}, fits nothing",
     check=lambda task: None,
     estimate=lambda task: Cost(0.1, 2e6),
-    predicts=lambda task: Prospect(0, None, f"baseline {task.settings.kind}"),
+    predicts=lambda task: Prospect(0, None, NAMES[task.settings.kind]),
 )

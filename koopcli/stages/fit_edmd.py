@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from koopcli.checks import build
-from koopcli.config.settings import FitEdmd, GridSample
+from koopcli.config.samples import GridSample
+from koopcli.config.settings import FitEdmd
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import edmd
 from koopcli.koopman.bases import BASES
@@ -49,7 +50,9 @@ def _prospect(task: Task) -> Prospect:
     if sample is not None:
         drawn = sample.settings
         about = f"{drawn.draw} {drawn.seed}" if isinstance(drawn, GridSample) else drawn.kind
-    return Prospect(_functions(task), None, about, settings.order if settings.basis != "states" else None)
+    if settings.basis == "states":
+        return Prospect(_functions(task), None, "DMD", about)
+    return Prospect(_functions(task), None, f"EDMD, order {settings.order}", about, settings.order)
 
 
 def _check(task: Task) -> None:

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from koopcli.checks import build
-from koopcli.config.settings import BoxSample, FitEigen, GridSample, SampleSettings
+from koopcli.config.samples import BoxSample, GridSample, PointSample, SampleSettings
+from koopcli.config.settings import FitEigen
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import eigenfunctions
 from koopcli.koopman.modes import Modes
@@ -103,7 +104,7 @@ def _driven(sample: SampleSettings) -> bool:
     """Whether the inputs of a sample change within or between its trajectories."""
     if isinstance(sample, GridSample):
         return max(sample.levels) > 0 and len(sample.levels) * sample.columns > 1
-    return isinstance(sample, BoxSample) and sample.excitation != "none" and sample.amplitude > 0
+    return isinstance(sample, (BoxSample, PointSample)) and sample.excitation != "none" and sample.amplitude > 0
 
 
 def _prospect(task: Task) -> Prospect:

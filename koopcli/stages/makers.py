@@ -7,6 +7,8 @@ from koopcli.stages.base import Prospect, Stage, Task
 
 MAKERS: dict[str, Stage] = {module.STAGE.name: module.STAGE for module in (fit_edmd, fit_eigen, baseline)}
 
+LIFTED = tuple(name for name in MAKERS if name != baseline.STAGE.name)  # of predictors with lifted states
+
 
 def prospect(predictor: Task) -> Prospect:
     """What is known of a predictor before it is made."""

@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
+from typing import get_args
 
 from koopcli.checks import build
 from koopcli.config.experiment import Experiment
-from koopcli.config.settings import (
-    CUSTOMS,
-    INPUTS,
-    SAMPLED_FOR,
-    BoxSample,
-    ImageFormat,
-    Plot,
-    SampleSettings,
-    Series,
-    Simulate,
-)
+from koopcli.config.samples import CUSTOMS, SAMPLED_FOR, SampleSettings
+from koopcli.config.settings import Baseline, BaselineKind, FitEdmd, Simulate, Tyres
 from koopcli.errors import InvalidValueError
-from koopcli.figures import source_digest
-from koopcli.figures.registry import FIGURES
 from koopcli.records import Meta
 from koopcli.stages.base import Task
-from koopcli.stages.makers import MAKERS, prospect
+from koopcli.stages.makers import MAKERS
+from koopcli.vehicles.single_track import wheel_loads
 
 FITS = tuple(MAKERS)
+BESIDE = (FitEdmd(basis="states"), FitEdmd(order=3), FitEdmd(order=5))  # EDMD of any trajectories, for comparison
+OF_TYRES = ("m", "l_f", "l_r", "mu_scale", "lateral", "longitudinal")  # parameters that tyre forces depend on
 
 
 def sample(settings: SampleSettings) -> Task:
@@ -73,6 +67,12 @@ def test_set(experiment: Experiment, plant: Simulate, **changed: object) -> Task
     return Task("simulate", replace(plant, steps=settings.horizon), (("sample", sample(settings)),))
 
 
+def driven(experiment: Experiment, plant: Simulate) -> Task:
+    """The one trajectory that the paper draws with random inputs, of ``plant`` with its vehicle and period."""
+    start = experiment.tabled("point")
+    return Task("simulate", replace(plant, steps=start.horizon), (("sample", sample(start)),))
+
+
 def remembered_simulation(about: Meta, dt: float) -> Simulate:
     """The simulation that a predictor remembers, for when its trajectories are no longer in the store."""
     return build(Simulate, {**about, "dt": dt})
@@ -99,45 +99,40 @@ def order_sweep(experiment: Experiment) -> list[Task]:
     return [evaluation(with_order(experiment, order)) for order in experiment.reproduce.orders]
 
 
-def drawn_by_default(figure: str, experiment: Experiment) -> list[Task]:
-    """The evaluations that a figure draws when none is named."""
-    if FIGURES[figure].several:
-        return order_sweep(experiment)
-    return [evaluation(experiment, fit_eigen(experiment))]
+def side_by_side(experiment: Experiment) -> list[Task]:
+    """Evaluations on one test set: eigenfunctions, and what they are set beside."""
+    training = simulation(experiment, plant="slips")
+    predictors = [fit_eigen(experiment, training), *beside(experiment, training)]
+    return [evaluation(experiment, predictor) for predictor in predictors]
 
 
-def figure(name: str, evaluations: Sequence[Task], image: ImageFormat) -> Task:
-    """The figure ``name`` of ``evaluations``.
-
-    Raises ``InvalidValueError`` for more of them than it draws, and for two that would be one point of one curve.
-    """
-    kind = FIGURES[name]
-    if len(evaluations) != 1 and not kind.several:
-        raise InvalidValueError(f"the figure '{name}' draws one evaluation, got {len(evaluations)}")
-    series = tuple(_series(task) for task in evaluations)
-    for one in series:
-        if kind.several and one.order is None:
-            raise InvalidValueError(
-                f"the figure '{name}' takes evaluations of EDMD predictors, which have an order, not of {one.label}"
-            )
-        if series.count(one) > 1:
-            raise InvalidValueError(
-                f"several evaluations of order {one.order}, {one.label}: name each once, and those of one experiment"
-            )
-    inputs = tuple((f"{i}/{role}", _behind(task, role)) for i, task in enumerate(evaluations) for role in kind.roles)
-    return Task("plot", build(Plot, vars(Plot(name, image, series, source_digest()))), inputs)  # type: ignore[arg-type]
+def tyres(experiment: Experiment) -> tuple[Tyres, ...]:
+    """The tyres of the experiment's vehicle and of those beside it. Raises ``InvalidValueError`` for one without."""
+    found = []
+    for name, there in vehicles(experiment):
+        p = there.vehicle
+        if p.lateral is None or p.longitudinal is None:
+            raise InvalidValueError(f"the vehicle {name} has no tyres: give its file [lateral] and [longitudinal]")
+        found.append(Tyres(name, wheel_loads(p), p.mu_scale, p.lateral, p.longitudinal))
+    return tuple(found)
 
 
-def _behind(evaluation: Task, role: str) -> Task:
-    """The evaluation itself, or what it was made from."""
-    if role == "evaluation":
-        return evaluation
-    if role == "training":
-        return evaluation.input("predictor").input("trajectories")
-    return evaluation.input(role)
+def vehicles(experiment: Experiment) -> list[tuple[str, Experiment]]:
+    """The experiment's own vehicle and those beside it, each under a name of its own; the same one only once."""
+    found = [(experiment.vehicle_name, experiment)]
+    for name in experiment.reproduce.beside:
+        there = experiment.with_vehicle(name)
+        label = Path(name).stem
+        if any(label == known for known, _ in found):
+            label = f"{label} as its file has it"
+        if all(there.vehicle != one.vehicle for _, one in found):
+            found.append((label, there))
+    return found
 
 
-def _series(evaluation: Task) -> Series:
-    about, test = prospect(evaluation.input("predictor")), evaluation.input("trajectories").ancestor("sample").settings
-    inputs = INPUTS[test.excitation] if isinstance(test, BoxSample) else test.kind
-    return Series(f"{about.label}, {inputs}", about.order)
+def beside(experiment: Experiment, training: Task) -> Iterator[Task]:
+    """What any predictor of ``training`` is set beside: baselines that fit nothing, and EDMD of the same data."""
+    for kind in get_args(BaselineKind):
+        yield baseline(replace(experiment, baseline=Baseline(kind)), training)
+    for fit in BESIDE:
+        yield fit_edmd(replace(experiment, fit_edmd=fit), training)

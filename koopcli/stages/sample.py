@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from koopcli.checks import build
-from koopcli.config.settings import (
+from koopcli.config.samples import (
     SAMPLED_FOR,
     SAMPLES,
     BallSample,
     BoxSample,
     EllipsoidSample,
     GridSample,
+    PointSample,
     SampleSettings,
 )
 from koopcli.errors import InvalidValueError
@@ -37,6 +38,9 @@ def _run(settings: SampleSettings, inputs: Inputs, context: Context) -> Sample:
         factors, u = sampling.grid(s.seed, s.box, s.count, s.draw, s.levels, s.columns, n_u)
     elif isinstance(s, BoxSample):
         states, u = sampling.box(s.seed, s.box, s.count, s.excitation, s.amplitude, s.steps, n_u)
+    elif isinstance(s, PointSample):
+        states = np.array([s.x0])
+        u = sampling.excite(np.random.default_rng(s.seed), s.excitation, s.amplitude, 1, s.steps, n_u)
     else:
         points = sampling.ball(s.seed, s.count) if isinstance(s, BallSample) else sampling.MESHES[s.mesh](s.count)
         states, u = points * sampling.semi_axes(s.energy, s.m, s.Jzz), np.zeros((s.count, 1, n_u))
@@ -53,6 +57,8 @@ def _check(task: Task) -> None:
     names = PLANTS[SAMPLED_FOR[s.kind]].states.names
     if isinstance(s, (GridSample, BoxSample)) and len(s.box) != len(names):
         raise InvalidValueError(f"'sample.box' must have one half-width for each of {', '.join(names)}, got {s.box}")
+    if isinstance(s, PointSample) and len(s.x0) != len(names):
+        raise InvalidValueError(f"'sample.x0' must have one value for each of {', '.join(names)}, got {s.x0}")
     if isinstance(s, EllipsoidSample):
         sampling.check_mesh(s.mesh, s.count)
     refuse_beyond_memory("the sample", _estimate(task).bytes, "sample.count")

@@ -7,7 +7,8 @@ from dataclasses import asdict
 import numpy as np
 
 from koopcli.checks import build
-from koopcli.config.settings import SAMPLED_FOR, Simulate
+from koopcli.config.samples import SAMPLED_FOR
+from koopcli.config.settings import Simulate
 from koopcli.errors import InvalidValueError
 from koopcli.records import Meta, Sample, Trajectories
 from koopcli.simulation.integrate import simulate

@@ -25,6 +25,12 @@ def kinetic_energy(parameters: VehicleParameters, x: FloatArray) -> FloatArray:
     return energy
 
 
+def wheel_loads(p: VehicleParameters) -> tuple[float, float]:
+    """Static load of one wheel of the front and of the rear axle in N."""
+    L = p.l_f + p.l_r
+    return p.l_r * p.m * G / (2 * L), p.l_f * p.m * G / (2 * L)
+
+
 def _body(p: VehicleParameters, x: FloatArray, F_x: FloatArray, front: FloatArray, rear: FloatArray) -> FloatArray:
     """dx/dt (..., 3) under the sum of longitudinal forces and the lateral force of each axle in N, (1.1) to (1.3)."""
     v_x, v_y, yaw_rate = x[..., 0], x[..., 1], x[..., 2]
@@ -141,8 +147,7 @@ class SlipInput:
     @cached_property
     def _loads(self) -> FloatArray:
         """Static load of one wheel of the front and of the rear axle in N, (2,)."""
-        p = self.parameters
-        return np.array([p.l_r, p.l_f]) * p.m * G / (2 * (p.l_f + p.l_r))
+        return np.array(wheel_loads(self.parameters))
 
     def _wheel_velocities(self, x: FloatArray, steer: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Velocities in m/s at the axles in the frame of their wheels, along and across, (..., 2) each."""

@@ -97,7 +97,7 @@ def one_line(result, code, *parts):
         (["reproduce", "edmd", "--set", "vehicle.mu_scale=2"], 2, "changes nothing in reproduce edmd"),
         (["reproduce", "eigen", "--set", "test.seed=2"], 2, "reproduce.seeds"),
         (["reproduce", "edmd", "--set", "sample.kind=box"], 2, "reproduce has its own sample.kind"),
-        (["plot", "error-map", "--set", "fit-edmd.order=3"], 2, "changes nothing in the figure 'error-map'"),
+        (["plot", "error-map", "--set", "fit-edmd.order=3"], 2, "the figure 'error-map' draws nothing of it"),
         (["fit-edmd", "--set", "test.count=7"], 2, "--set test.count changes nothing here"),
         (["simulate", "--vehicle", "~nouser/x.toml"], 3, "~nouser/x.toml"),
         (["simulate", "--vehicle", "x" * 300 + ".toml"], 3, "File name too long"),

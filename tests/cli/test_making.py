@@ -109,19 +109,6 @@ def test_any_setting_upstream_can_be_set(koop):
     assert shown["settings"]["predictor / trajectories / sample (sample)"]["seed"] == 3
 
 
-def test_plot_writes_the_image(koop, folder):
-    for ending, head in ((".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")):
-        done = koop("plot", "orders", "-o", f"orders{ending}")
-        assert done.code == 0
-        assert done.out.startswith("plot/")
-        assert (folder / f"orders{ending}").read_bytes().startswith(head)
-    evaluations = [koop("evaluate", "--set", f"fit-edmd.order={order}").name for order in (1, 2)]
-    named = koop("plot", "orders", *evaluations)
-    assert named.name == koop("plot", "orders").name
-    assert "-o FILE" in named.err
-    assert "orders" in koop("plot", "--list").out
-
-
 def test_three_lines_in_a_notebook(koop):
     name = koop("fit-edmd").name
     predictor = koopcli.load(name)

@@ -6,20 +6,11 @@ from typing import get_args, get_type_hints
 
 import pytest
 
-from koopcli.config import settings
+from koopcli.config import samples, settings
 from koopcli.config.data import data_folder
 from koopcli.config.experiment import SECTIONS, load_experiment, parse_set
-from koopcli.config.settings import (
-    SAMPLES,
-    Baseline,
-    BoxSample,
-    Evaluate,
-    FitEdmd,
-    FitEigen,
-    GridSample,
-    Reproduce,
-    Simulate,
-)
+from koopcli.config.samples import SAMPLES, BoxSample, GridSample
+from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, PlotOptions, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError, UsageError
 from koopcli.figures.registry import FIGURES
 from koopcli.koopman.baselines import FORECASTS
@@ -35,17 +26,17 @@ PAPER = tomllib.loads((data_folder() / "experiments" / "paper.toml").read_text()
 @pytest.mark.parametrize(
     ("literal", "registry"),
     [
-        (settings.Draw, DRAWS),
-        (settings.PlantName, PLANTS),
+        (samples.Draw, DRAWS),
+        (samples.PlantName, PLANTS),
         (settings.ForcePer, WHEELS_PER_FORCE),
         (settings.BasisName, BASES),
         (settings.FigureName, FIGURES),
-        (settings.Kind, settings.SAMPLES),
-        (settings.Kind, settings.SAMPLED_FOR),
-        (settings.PlantName, settings.CUSTOMS),
-        (settings.PlantName, settings.UNUSED),
-        (settings.Excitation, settings.INPUTS),
-        (settings.Mesh, MESHES),
+        (samples.Kind, samples.SAMPLES),
+        (samples.Kind, samples.SAMPLED_FOR),
+        (samples.PlantName, samples.CUSTOMS),
+        (samples.PlantName, settings.UNUSED),
+        (samples.Excitation, samples.INPUTS),
+        (samples.Mesh, MESHES),
         (settings.LiftName, TABLES),
         (settings.BaselineKind, FORECASTS),
     ],
@@ -68,7 +59,13 @@ def test_the_paper_file_writes_out_every_default():
     assert loaded.evaluate == Evaluate()
     assert loaded.reproduce == Reproduce()
     assert loaded.simulate == Simulate(vehicle=loaded.simulate.vehicle)
-    for section, kind in (("sample", "grid"), ("sample", "ellipsoid"), ("test", "box"), ("test", "ball")):
+    for section, kind in (
+        ("sample", "grid"),
+        ("sample", "ellipsoid"),
+        ("test", "box"),
+        ("test", "point"),
+        ("test", "ball"),
+    ):
         assert set(PAPER[section][kind]) == {f.name for f in fields(SAMPLES[kind])} - {"kind", "m", "Jzz"}
     for section, cls in {"fit-edmd": FitEdmd, "fit-eigen": FitEigen, "evaluate": Evaluate}.items():
         assert set(PAPER[section]) == {f.name for f in fields(cls) if f.default is not None}
@@ -78,7 +75,7 @@ def test_the_paper_file_writes_out_every_default():
 
 
 def test_every_setting_has_a_help_text():
-    for cls in (*SAMPLES.values(), FitEdmd, FitEigen, Baseline, Evaluate, Simulate, Reproduce):
+    for cls in (*SAMPLES.values(), FitEdmd, FitEigen, Baseline, Evaluate, PlotOptions, Simulate, Reproduce):
         hints = get_type_hints(cls)
         for f in fields(cls):
             if f.name not in ("kind", "vehicle", "m", "Jzz"):

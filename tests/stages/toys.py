@@ -12,19 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from koopcli.checks import build
-from koopcli.config.settings import (
-    BallSample,
-    Baseline,
-    BoxSample,
-    EllipsoidSample,
-    Evaluate,
-    FitEdmd,
-    FitEigen,
-    GridSample,
-    Plot,
-    Series,
-    Simulate,
-)
+from koopcli.config.samples import BallSample, BoxSample, EllipsoidSample, GridSample, PointSample
+from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Plot, Series, Simulate, Tyres
+from koopcli.figures.registry import FIGURES
 from koopcli.koopman.baselines import Forecast
 from koopcli.koopman.bases import TensorPolynomial
 from koopcli.koopman.coverage import Coverage
@@ -149,6 +139,55 @@ def _slid() -> Sample:
     return Sample((), np.array([[20.0, 1, 2], [-5, 3, -8], [0.01, -2, 5]]), u, False, STATES, SlipInput.inputs)
 
 
+def _few() -> Trajectories:
+    """As many trajectories as the evaluation has scores."""
+    data = _calm()
+    return Trajectories(data.x[5:15], data.u[5:15], data.dt, STATES, INPUTS)
+
+
+def _on_a_surface() -> Sample:
+    """Nine states, three latitudes of three, on the ellipsoid of semi-axes 20, 10 and 5."""
+    up, around = np.meshgrid([-1.0, 0.0, 1.0], [0.0, 2.0, 4.0], indexing="ij")
+    points = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)], axis=-1)
+    return Sample((), points.reshape(9, 3) * [20.0, 10, 5], np.zeros((9, 1, 4)), False, STATES, SlipInput.inputs)
+
+
+def figure_settings(name: str) -> Plot:
+    """The figure ``name`` of one toy, or of two where it draws several."""
+    kind = FIGURES[name]
+    labels = {"one": (), "beside": ("one", "another"), "points": ("one", "one")}[kind.draws]
+    told = {
+        "restart": 3,
+        "tyres": tuple(
+            Tyres(label, loads, 0.9, CAR.lateral, CAR.longitudinal)
+            for label, loads in (("even", (3000.0, 3000.0)), ("nose-heavy", (4000.0, 3000.0)))
+        ),
+    }
+    return build(
+        Plot,
+        {
+            "figure": name,
+            "format": "png",
+            "drawn_by": "",
+            "series": tuple(Series(label, i + 3 if kind.draws == "points" else None) for i, label in enumerate(labels)),
+            **{field: told[field] for field in kind.told},
+        },
+    )
+
+
+def figure_records(name: str) -> dict:
+    """What the figure of :func:`figure_settings` draws."""
+    kind = FIGURES[name]
+    records = {
+        "evaluation": _evaluation(),
+        "predictor": _predictor() if kind.takes in ("predictor", "fit") else _looked_up(),
+        "trajectories": _trajectories(7) if kind.takes == "predictor" else _few(),
+        "training": _gliding(),
+        "sample": _on_a_surface(),
+    }
+    return {f"{i}/{role}": records[role] for i in range(1 if kind.draws == "one" else 2) for role in kind.roles}
+
+
 def _chunks(count, size, compute):
     return [compute(slice(start, min(start + size, count))) for start in range(0, count, size)]
 
@@ -162,6 +201,8 @@ TOYS = {
         (EllipsoidSample(count=16, m=1200.0, Jzz=1500.0), {}),
         (EllipsoidSample(count=15, mesh="fibonacci", energy=1e5, m=1200.0, Jzz=1500.0), {}),
         (BallSample(count=5, m=1200.0, Jzz=1500.0), {}),
+        (PointSample(steps=4), {}),
+        (PointSample(x0=(3.0, 2.0, 1.0), excitation="held", seed=5), {}),
     ],
     "simulate": [
         (Simulate(vehicle=CAR, plant="forces", steps=3), {"sample": _sample()}),
@@ -192,20 +233,7 @@ TOYS = {
             for kind in ("hold", "rotation", "linearisation")
         ),
     ],
-    "plot": [
-        (
-            build(Plot, {"figure": "orders", "format": "png", "series": (Series("a", 3),), "drawn_by": ""}),
-            {"0/evaluation": _evaluation()},
-        ),
-        (
-            build(Plot, {"figure": "error-map", "format": "png", "series": (Series("a", None),), "drawn_by": ""}),
-            {"0/evaluation": _evaluation(), "0/training": _gliding()},
-        ),
-        (
-            build(Plot, {"figure": "mean-trajectory", "format": "png", "series": (Series("a", None),), "drawn_by": ""}),
-            {"0/evaluation": _evaluation(), "0/predictor": _looked_up(), "0/trajectories": _calm()},
-        ),
-    ],
+    "plot": [(figure_settings(name), figure_records(name)) for name in FIGURES],
 }
 
 

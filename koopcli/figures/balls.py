@@ -1,0 +1,51 @@
+"""Initial states with the errors of their trajectories, drawn as balls: what two figures share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from koopcli.figures.drawing import any_error, column, state_columns
+from koopcli.koopman.evaluation import Evaluation
+from koopcli.records import Array, Channels, FloatArray
+
+LARGEST_SHOWN = 0.98  # quantile of the errors where the colours end
+
+
+@dataclass(frozen=True)
+class Balls:
+    """``x0`` (n, n_x) with its ``rmse`` (n,) in percent, the largest errors last, and ``top``, where colours end."""
+
+    x0: FloatArray
+    rmse: FloatArray
+    top: float
+    channels: Channels
+
+    @property
+    def sizes(self) -> FloatArray:
+        """Areas (n,) in square points: larger where the error is."""
+        return np.asarray(1 + 14 * np.clip(self.rmse / self.top, 0, 1))
+
+    @property
+    def beyond(self) -> str:
+        """How a colour bar ends: pointed where errors are larger than the last colour."""
+        return "max" if self.rmse.max() > self.top else "neither"
+
+
+def balls(evaluation: Evaluation) -> Balls:
+    """The initial states of an evaluation. Raises ``InvalidValueError`` where every prediction diverged."""
+    shown = any_error(evaluation.rmse, evaluation.diverged)
+    order = np.argsort(evaluation.rmse[shown], kind="stable")
+    x0, rmse = evaluation.x0[shown][order], evaluation.rmse[shown][order]
+    top = float(np.quantile(rmse, LARGEST_SHOWN)) or 1.0
+    return Balls(x0, rmse, top, evaluation.state_channels)
+
+
+def columns(shown: Balls) -> Mapping[str, Array]:
+    """Every initial state with its error."""
+    return {
+        **state_columns(shown.x0, shown.channels, "trajectory", "{}_0"),
+        "rmse": column(shown.rmse, "trajectory", "%"),
+    }

@@ -1,0 +1,86 @@
+"""Several predictors on one test set: the spread of their errors side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from koopcli.config.settings import Plot
+from koopcli.figures.drawing import Source, any_error, column
+from koopcli.figures.style import COLOURS, COLUMN, plain_numbers, style
+from koopcli.records import Array, FloatArray
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """The RMSE of one predictor's trajectories in percent: ``quantiles`` (5,) and ``mean``; how many ``diverged``."""
+
+    label: str
+    quantiles: FloatArray
+    mean: float
+    diverged: int
+
+
+def select(sources: Sequence[Source], settings: Plot) -> list[Spread]:
+    """What the figure shows. Raises ``InvalidValueError`` where every prediction of an evaluation diverged."""
+    found = []
+    for source in sources:
+        evaluation = source.records["evaluation"]
+        rmse = evaluation.rmse[any_error(evaluation.rmse, evaluation.diverged)]
+        diverged = int(evaluation.diverged.sum())
+        found.append(Spread(source.label, np.quantile(rmse, QUANTILES), float(rmse.mean()), diverged))
+    return found
+
+
+def numbers(shown: Sequence[Spread]) -> Mapping[str, Array]:
+    """For each predictor its quantiles, its mean and how many diverged."""
+    found = {"quantile": column(np.array(QUANTILES), "quantile", "1")}
+    for one in shown:
+        found[f"{one.label}/rmse"] = column(one.quantiles, "quantile", "%")
+        found[f"{one.label}/mean"] = column(np.array([one.mean]), "predictor", "%")
+        found[f"{one.label}/diverged"] = column(np.array([float(one.diverged)]), "predictor", "1")
+    return found
+
+
+def draw(shown: Sequence[Spread]) -> Figure:
+    """A row for each predictor, in the order given: box and whiskers with the mean, which is written beside it."""
+    with style():
+        figure = Figure(figsize=(COLUMN, 1.0 + 0.3 * len(shown)), layout="constrained")
+        axes = figure.subplots()
+        for row, one in enumerate(shown):
+            named = str if row == 0 else _nameless
+            low, first, median, third, high = one.quantiles
+            axes.plot([low, high], [row, row], "-", color=COLOURS[0], linewidth=0.8, zorder=2, label=named("5 to 95 %"))
+            axes.barh(row, third - first, left=first, height=0.5, color=COLOURS[5], zorder=3, label=named("quartiles"))
+            axes.plot(
+                [median, median],
+                [row - 0.25, row + 0.25],
+                "-",
+                color=COLOURS[0],
+                linewidth=1.6,
+                zorder=4,
+                label=named("median"),
+            )
+            axes.plot(one.mean, row, "D", color=COLOURS[1], markersize=4, zorder=5, label=named("mean"))
+        axes.set_xscale("log")
+        plain_numbers(axes.xaxis)
+        axes.set_ylim(len(shown) - 0.5, -0.5)
+        axes.set_yticks(range(len(shown)), [_row(one) for one in shown])
+        axes.grid(visible=False, axis="y")
+        axes.set_xlabel("RMSE (%)")
+        figure.legend(loc="outside lower center", ncols=4, columnspacing=1.0, handletextpad=0.5)
+    return figure
+
+
+def _nameless(label: str) -> None:
+    """No entry of the legend: the first row has it."""
+
+
+def _row(one: Spread) -> str:
+    lost = f", {one.diverged} diverged" if one.diverged else ""
+    return f"{one.label}\nmean {one.mean:.3g} %{lost}"

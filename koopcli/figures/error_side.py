@@ -1,0 +1,74 @@
+"""The errors from the side, in the plane of the second and third state, over the training trajectories in grey."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from koopcli.config.settings import Plot
+from koopcli.figures.balls import Balls, balls, columns
+from koopcli.figures.drawing import Source, column, state_columns
+from koopcli.figures.style import COLUMN, SHADES, TRAINING, axis_label, style
+from koopcli.records import Array, FloatArray, Trajectories
+
+PATHS = 500  # training trajectories drawn at most
+SIDE = [1, 2]  # the states of the plane
+
+
+@dataclass(frozen=True)
+class ErrorSide:
+    """The ``balls`` and the training ``paths`` (J, samples, n_x)."""
+
+    balls: Balls
+    paths: FloatArray
+
+
+def select(sources: Sequence[Source], settings: Plot) -> ErrorSide:
+    """What the figure shows. Raises ``InvalidValueError`` where every prediction diverged."""
+    records = sources[0].records
+    training: Trajectories = records["training"]
+    each = -(-len(training) // PATHS)
+    return ErrorSide(balls(records["evaluation"]), np.asarray(training.x[::each]))
+
+
+def numbers(shown: ErrorSide) -> Mapping[str, Array]:
+    """Every initial state with its error, and the training trajectories one after another."""
+    J, samples, n_x = shown.paths.shape
+    paths = state_columns(shown.paths.reshape(-1, n_x), shown.balls.channels, "sample", "training {}")
+    number = column(np.repeat(np.arange(J), samples), "sample", "1")
+    return {**columns(shown.balls), "training trajectory": number, **paths}
+
+
+def draw(shown: ErrorSide) -> Figure:
+    """One plane."""
+    seen, channels = shown.balls, shown.balls.channels
+    i, j = SIDE
+    with style():
+        figure = Figure(figsize=(COLUMN, 2.9), layout="constrained")
+        axes = figure.subplots()
+        if shown.paths.shape[1] > 2:
+            lines = list(shown.paths[:, :, SIDE])
+            axes.add_collection(LineCollection(lines, colors=TRAINING, linewidths=0.3, rasterized=True))
+        else:  # single steps are too short to see
+            axes.plot(shown.paths[:, 0, i], shown.paths[:, 0, j], "s", color=TRAINING, markersize=3, zorder=1)
+        balls = axes.scatter(
+            seen.x0[:, i],
+            seen.x0[:, j],
+            s=seen.sizes,
+            c=seen.rmse,
+            cmap=SHADES,
+            vmin=0,
+            vmax=seen.top,
+            linewidths=0,
+            zorder=3,
+            rasterized=True,
+        )
+        axes.set_xlabel(axis_label(channels.names[i], channels.units[i]))
+        axes.set_ylabel(axis_label(channels.names[j], channels.units[j]))
+        axes.autoscale_view()
+        figure.colorbar(balls, ax=axes, label="RMSE (%)", extend=seen.beyond)
+    return figure

@@ -1,0 +1,90 @@
+"""Error against time: how far ahead a prediction can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from koopcli.config.settings import Plot
+from koopcli.figures.drawing import Source, any_error, column
+from koopcli.figures.style import COLOURS, COLUMN, looks, plain_numbers, style
+from koopcli.records import Array, FloatArray, Trajectories
+
+QUANTILES = {"lower": 0.1, "median": 0.5, "upper": 0.9}
+SHOWN_FROM = 1e-3  # %, of errors on a logarithmic axis; a start that is known is exact
+
+
+@dataclass(frozen=True)
+class ErrorOverTime:
+    """Quantiles (samples,) over the trajectories, in percent, of the error at ``time`` (samples,) in s.
+
+    The error at a sample is ‖x̂_k - x_k‖ over the root mean square of ‖x‖ along its trajectory, so that the root mean
+    square of it over time is the RMSE.
+    """
+
+    label: str
+    time: FloatArray
+    lower: FloatArray
+    median: FloatArray
+    upper: FloatArray
+
+
+def select(sources: Sequence[Source], settings: Plot) -> list[ErrorOverTime]:
+    """What the figure shows. Raises ``InvalidValueError`` where every prediction of an evaluation diverged."""
+    return [_over_time(source) for source in sources]
+
+
+def _over_time(source: Source) -> ErrorOverTime:
+    evaluation, predictor, test = (source.records[role] for role in ("evaluation", "predictor", "trajectories"))
+    assert isinstance(test, Trajectories)
+    shown = any_error(evaluation.rmse, evaluation.diverged)
+    x, u = np.asarray(test.x[:])[shown], np.asarray(test.u[:])[shown]
+    error = np.linalg.norm(predictor.predict(x[:, 0], u) - x, axis=2)
+    size = np.sqrt((x[:, evaluation.first :] ** 2).sum(axis=2).mean(axis=1))
+    relative = 100 * error / size[:, np.newaxis]
+    time = test.dt * np.arange(test.steps + 1.0)
+    statistics = {name: np.quantile(relative, q, axis=0) for name, q in QUANTILES.items()}
+    return ErrorOverTime(source.label, time, **statistics)
+
+
+def numbers(shown: Sequence[ErrorOverTime]) -> Mapping[str, Array]:
+    """Time, and the quantiles of each evaluation."""
+    found = {"time": column(shown[0].time, "sample", "s")}
+    for one in shown:
+        for name in QUANTILES:
+            found[f"{one.label}/{name}".removeprefix("/")] = column(getattr(one, name), "sample", "%")
+    return found
+
+
+def draw(shown: Sequence[ErrorOverTime]) -> Figure:
+    """Median and the band that holds eight of ten trajectories of one evaluation; medians of several."""
+    with style():
+        figure = Figure(figsize=(COLUMN, 2.5 + 0.07 * len(shown)), layout="constrained")
+        axes = figure.subplots()
+        for one, look in zip(shown, looks(len(shown)), strict=True):
+            if len(shown) == 1:
+                axes.fill_between(
+                    one.time,
+                    _seen(one.lower),
+                    _seen(one.upper),
+                    color=COLOURS[5],
+                    alpha=0.4,
+                    linewidth=0,
+                    label="10 to 90 % of trajectories",
+                )
+            axes.plot(one.time, _seen(one.median), label=one.label or "median", **look)
+        axes.set_yscale("log")
+        plain_numbers(axes.yaxis)
+        axes.set_xlabel("time (s)")
+        axes.set_ylabel("error (% of the trajectory's size)" if len(shown) == 1 else "median error (%)")
+        axes.set_xlim(shown[0].time[0], shown[0].time[-1])
+        figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+def _seen(values: FloatArray) -> FloatArray:
+    """Errors that a logarithmic axis can show; an exact start has none."""
+    return np.where(values > SHOWN_FROM, values, np.nan)

@@ -1,0 +1,79 @@
+"""How the RMSE of the trajectories is distributed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from koopcli.config.settings import Plot
+from koopcli.figures.drawing import Source, any_error, column
+from koopcli.figures.style import COLOURS, COLUMN, looks, plain_numbers, style
+from koopcli.records import Array, FloatArray
+
+BINS = 40
+LOWEST, HIGHEST = 0.002, 0.998  # quantiles between which the bins lie; what is beyond falls into the outermost
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """``share`` (bins,) of the trajectories in percent between ``edges`` (bins + 1,) in percent of RMSE."""
+
+    label: str
+    edges: FloatArray
+    share: FloatArray
+    mean: float
+    median: float
+
+
+def select(sources: Sequence[Source], settings: Plot) -> list[Histogram]:
+    """What the figure shows, every evaluation in the same bins, even on a logarithmic axis.
+
+    Raises ``InvalidValueError`` where every prediction of an evaluation diverged.
+    """
+    errors = []
+    for source in sources:
+        evaluation = source.records["evaluation"]
+        errors.append(evaluation.rmse[any_error(evaluation.rmse, evaluation.diverged)])
+    every = np.concatenate(errors)
+    low, high = np.quantile(every[every > 0] if (every > 0).any() else [1.0], [LOWEST, HIGHEST])
+    edges = np.geomspace(low * (1 - 1e-9), max(high, low * 1.01) * (1 + 1e-9), BINS + 1)
+    found = []
+    for source, rmse in zip(sources, errors, strict=True):
+        counts = np.histogram(np.clip(rmse, edges[0], edges[-1]), edges)[0]
+        share = 100 * counts / len(rmse)
+        found.append(Histogram(source.label, edges, share, float(rmse.mean()), float(np.median(rmse))))
+    return found
+
+
+def numbers(shown: Sequence[Histogram]) -> Mapping[str, Array]:
+    """The bins, and the share of each evaluation in them."""
+    edges = shown[0].edges
+    found = {"rmse from": column(edges[:-1], "bin", "%"), "rmse to": column(edges[1:], "bin", "%")}
+    for one in shown:
+        found[f"{one.label}/share".removeprefix("/")] = column(one.share, "bin", "%")
+    return found
+
+
+def draw(shown: Sequence[Histogram]) -> Figure:
+    """Bars with mean and median of one evaluation; outlines of several."""
+    with style():
+        figure = Figure(figsize=(COLUMN, 2.4 + 0.13 * len(shown)), layout="constrained")
+        axes = figure.subplots()
+        for one, look in zip(shown, looks(len(shown)), strict=True):
+            if len(shown) == 1:
+                axes.stairs(one.share, one.edges, fill=True, color=COLOURS[5])
+                axes.axvline(one.mean, color=COLOURS[0], label=f"mean {one.mean:.4g} %")
+                axes.axvline(one.median, color=COLOURS[1], linestyle="--", label=f"median {one.median:.4g} %")
+            else:
+                axes.stairs(
+                    one.share, one.edges, label=f"{one.label} (median {one.median:.3g} %)", linewidth=1.2, **look
+                )
+        axes.set_xscale("log")
+        plain_numbers(axes.xaxis)
+        axes.set_xlabel("RMSE (%)")
+        axes.set_ylabel("share of trajectories (%)")
+        figure.legend(loc="outside lower center", ncols=2 if len(shown) == 1 else 1)
+    return figure

@@ -1,0 +1,81 @@
+"""The tyres of vehicles: force against slip, sideways and along."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from koopcli.config.settings import Plot, Tyres
+from koopcli.figures.drawing import Source, column
+from koopcli.figures.style import COLUMN, GUIDE, looks, style
+from koopcli.records import Array, FloatArray
+from koopcli.vehicles.tyre import force
+
+LARGEST_ANGLE, LARGEST_RATIO = np.deg2rad(30.0), 0.5
+POINTS = 401
+
+
+@dataclass(frozen=True)
+class TyreCurve:
+    """Force in N of one wheel of the axle in ``label``: ``lateral`` (m,) against ``slip_angle`` (m,) in rad and
+    ``longitudinal`` (m,) against ``slip_ratio`` (m,).
+    """
+
+    label: str
+    slip_angle: FloatArray
+    lateral: FloatArray
+    slip_ratio: FloatArray
+    longitudinal: FloatArray
+
+
+def select(sources: Sequence[Source], settings: Plot) -> list[TyreCurve]:
+    """A curve for each vehicle, two for one whose axles carry different loads."""
+    return [curve for tyres in settings.tyres for curve in _curves(tyres)]
+
+
+def _curves(tyres: Tyres) -> list[TyreCurve]:
+    front, rear = tyres.loads
+    axles = (
+        [(tyres.label, front)] if front == rear else [(f"{tyres.label}, front", front), (f"{tyres.label}, rear", rear)]
+    )
+    angle = np.linspace(-LARGEST_ANGLE, LARGEST_ANGLE, POINTS)
+    ratio = np.linspace(-LARGEST_RATIO, LARGEST_RATIO, POINTS)
+    grip = tyres.mu_scale
+    return [
+        TyreCurve(
+            label, angle, grip * force(tyres.lateral, angle, load), ratio, grip * force(tyres.longitudinal, ratio, load)
+        )
+        for label, load in axles
+    ]
+
+
+def numbers(curves: Sequence[TyreCurve]) -> Mapping[str, Array]:
+    """Slips and forces of every curve."""
+    found: dict[str, Array] = {}
+    for curve in curves:
+        for name, unit in (("slip_angle", "rad"), ("lateral", "N"), ("slip_ratio", "1"), ("longitudinal", "N")):
+            found[f"{curve.label}/{name}"] = column(getattr(curve, name), "point", unit)
+    return found
+
+
+def draw(curves: Sequence[TyreCurve]) -> Figure:
+    """Lateral and longitudinal force of one wheel under its static load."""
+    with style():
+        figure = Figure(figsize=(COLUMN, 2.3), layout="constrained")
+        side, along = figure.subplots(1, 2, sharey=True)
+        for curve, look in zip(curves, looks(len(curves)), strict=True):
+            side.plot(np.rad2deg(curve.slip_angle), curve.lateral / 1e3, label=curve.label, **look)
+            along.plot(curve.slip_ratio, curve.longitudinal / 1e3, **look)
+        for axes in (side, along):
+            axes.axhline(0, color=GUIDE, linewidth=0.5, zorder=1)
+            axes.axvline(0, color=GUIDE, linewidth=0.5, zorder=1)
+        side.set_xlabel("slip angle (°)")
+        along.set_xlabel("slip ratio (1)")
+        side.set_ylabel("force of one wheel (kN)")
+        side.set_title("lateral", fontsize=8)
+        along.set_title("longitudinal", fontsize=8)
+        figure.legend(loc="outside lower center", ncols=2)
+    return figure

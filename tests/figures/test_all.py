@@ -1,0 +1,191 @@
+"""What holds for every figure: asked of the registry, so that a new one is covered by its line there."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from importlib import import_module
+from io import BytesIO
+from pathlib import Path
+from types import SimpleNamespace
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from koopcli.config.settings import ImageFormat
+from koopcli.errors import InvalidValueError
+from koopcli.figures import style
+from koopcli.figures.drawing import Drawing, sources_of
+from koopcli.figures.registry import FIGURES, drawing
+from koopcli.stages.drawn import MADE, TAKES, TOLD
+from tests.stages.toys import figure_records, figure_settings
+
+SKETCHES = ("single-track",)  # drawn without axes
+EVALUATED = [name for name, kind in FIGURES.items() if kind.takes == "evaluation"]
+
+
+def drawn(name):
+    module = import_module(f"koopcli.figures.{name.replace('-', '_')}")
+    settings = figure_settings(name)
+    shown = module.select(sources_of(settings, figure_records(name)), settings)
+    return module.draw(shown), module.numbers(shown)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_its_line_names_what_there_is(name):
+    kind = FIGURES[name]
+    assert kind.takes in TAKES
+    assert kind.made in MADE
+    assert set(kind.told) <= set(TOLD)
+    assert not kind.about.endswith(".")
+
+
+@pytest.mark.parametrize("image", ImageFormat.__args__)
+@pytest.mark.parametrize("name", FIGURES)
+def test_the_same_records_give_the_same_bytes(name, image):
+    settings = replace(figure_settings(name), format=image)
+    one, other = (drawing(settings, figure_records(name)) for _ in range(2))
+    assert one.image == other.image
+    assert re.search(rb"20[2-9]\d-\d\d-\d\d", one.image) is None  # no date inside
+    start = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[image]
+    assert one.image.startswith(start)
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_it_fits_one_column_and_every_axis_has_its_unit(name):
+    figure, _ = drawn(name)
+    width, height = figure.get_size_inches()
+    assert width == style.COLUMN
+    assert height <= 1.8 * width
+    if name in SKETCHES:
+        return
+    figure.draw_without_rendering()  # before that, panels that share an axis do not know their labels
+    axes = [one for one in figure.axes if one.get_visible()]
+    labels = [label for one in axes for label in (one.get_xlabel(), one.get_ylabel())]
+    labels += [one.get_zlabel() for one in axes if hasattr(one, "get_zlabel")]
+    written = [label for label in labels if label]
+    assert written
+    assert [label for label in written if not re.search(r"\(.+\)$|order of the polynomial basis$", label)] == []
+    assert figure.get_suptitle() == ""
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_no_label_is_cut_off_or_lies_over_another(name):
+    figure, _ = drawn(name)
+    canvas = FigureCanvasAgg(figure)
+    with style.style():
+        canvas.draw()
+    boxes = {text.get_text(): text.get_window_extent(canvas.get_renderer()) for text in _labels(figure)}
+    assert boxes
+    for text, box in boxes.items():
+        inside = box.x0 >= 0 and box.y0 >= 0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
+        assert inside, f"{text!r} leaves the figure"
+        over = [other for other, there in boxes.items() if other != text and box.overlaps(there)]
+        assert not over, f"{text!r} lies over {over}"
+
+
+def _labels(figure):
+    """Axis labels, the names of panels and rows, legends, and the words of a sketch."""
+    for axes in figure.axes:
+        yield from axes.texts
+        if axes.axison or hasattr(axes, "zaxis"):
+            named = [axes.xaxis.label, axes.yaxis.label, axes.title]
+            named += [axes.zaxis.label] if hasattr(axes, "zaxis") else []
+            yield from (label for label in named if label.get_text())
+    for legend in figure.legends:
+        yield from legend.get_texts()
+        if legend.get_title().get_text():
+            yield legend.get_title()
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_its_numbers_are_columns_that_survive_the_store(name):
+    _, numbers = drawn(name)
+    assert numbers
+    for array in numbers.values():
+        assert array.values.ndim == len(array.axes) == 1
+        assert array.values.dtype == float
+        assert array.units
+    made = Drawing(name, "png", numbers, b"image")
+    back = Drawing.unpack(made.pack())
+    assert back.image == b"image"
+    assert back.table() == made.table()
+    header, rows = made.table()
+    assert len(rows) == max(len(array.values) for array in numbers.values())
+    assert all(len(row) == len(header) for row in rows)
+
+
+@pytest.mark.parametrize("name", EVALUATED)
+def test_an_evaluation_without_any_error_is_refused(name):
+    def lost(record):
+        if not hasattr(record, "diverged"):
+            return record
+        return replace(record, diverged=np.ones(len(record.rmse), dtype=bool))
+
+    records = {role: lost(record) for role, record in figure_records(name).items()}
+    with pytest.raises(InvalidValueError, match="diverged: there is no error to draw"):
+        drawing(figure_settings(name), records)
+
+
+@pytest.mark.parametrize("name", EVALUATED)
+def test_single_lost_trajectories_are_left_out(name):
+    """A diverged prediction has errors beyond all numbers, which no axis may follow."""
+
+    def one_lost(record):
+        if not hasattr(record, "diverged"):
+            return record
+        rmse = np.where(record.diverged, np.inf, record.rmse)
+        return replace(record, rmse=rmse)
+
+    records = {role: one_lost(record) for role, record in figure_records(name).items()}
+    _, numbers = (None, drawing(figure_settings(name), records).numbers)
+    assert all(np.isfinite(array.values).all() for array in numbers.values())
+
+
+def test_nothing_global_is_left_behind():
+    before = dict(mpl.rcParams)
+    for name in FIGURES:
+        drawing(figure_settings(name), figure_records(name))
+    assert dict(mpl.rcParams) == before
+
+
+def test_a_changed_drawing_has_another_key(monkeypatch, tmp_path):
+    """Pictures are not compared, so the code that draws them is part of their recipe."""
+    from koopcli import figures
+
+    before = figures.source_digest.__wrapped__()
+    for path in Path(figures.__file__).parent.glob("*.py"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    monkeypatch.setattr(figures, "__file__", str(tmp_path / "__init__.py"))
+    assert figures.source_digest.__wrapped__() == before
+    (tmp_path / "style.py").write_text("# another style")
+    assert figures.source_digest.__wrapped__() != before
+
+
+def test_many_lines_are_all_different():
+    found = style.looks(18)
+    assert len({tuple(look.values()) for look in found}) == 18
+
+
+def test_colours_are_told_apart_in_print():
+    """Neighbours in the list differ in lightness, so that they do in black and white too."""
+    r, g, b = np.array([mpl.colors.to_rgb(colour) for colour in style.COLOURS[:3]]).T
+    lightness = 0.2126 * r + 0.7152 * g + 0.0722 * b
+    assert len(set(np.round(lightness, 2))) == 3
+
+
+def test_short_columns_end_in_empty_cells():
+    numbers = {
+        "a": SimpleNamespace(values=np.arange(2.0), units="m"),
+        "b": SimpleNamespace(values=np.ones(1), units="s"),
+    }
+    assert Drawing("x", "png", numbers, b"").table() == (["a (m)", "b (s)"], [[0.0, 1.0], [1.0, ""]])
+
+
+def test_a_png_is_as_wide_as_a_column_in_print():
+    from matplotlib.image import imread
+
+    image = imread(BytesIO(drawing(figure_settings("tyre"), {}).image))
+    assert image.shape[1] == round(style.COLUMN * 300)

@@ -1,0 +1,150 @@
+"""The figures of EDMD: what is drawn, not how it looks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from koopcli.config.settings import Plot
+from koopcli.errors import InvalidValueError
+from koopcli.figures import orders, random_input, spectrum
+from koopcli.figures.drawing import Source
+from koopcli.figures.orders import OrderErrors
+from koopcli.koopman import edmd
+from koopcli.koopman.modes import Modes
+from koopcli.koopman.restarts import restarted
+from koopcli.records import Trajectories
+from tests.stages.toys import _looked_up, _predictor, _trajectories, figure_records, figure_settings
+
+
+def curve(label="random 0, fresh inputs"):
+    order = np.arange(1, 6)
+    return OrderErrors(label, order, 40.0 / order**2, 30.0 / order**2, 90.0 / order**2)
+
+
+class Scored:
+    """As much of an evaluation as the figure looks at."""
+
+    def __init__(self, mean):
+        self.mean = mean
+
+    def figures(self):
+        return {"rmse": {"mean": self.mean, "median": self.mean / 2, "max": 3 * self.mean}}
+
+
+def lines(figure):
+    return {line.get_label(): line for line in figure.axes[0].lines}
+
+
+def test_one_curve_shows_mean_median_and_maximum_and_the_paper():
+    figure = orders.draw([curve()])
+    found = lines(figure)
+    assert set(found) == {"mean", "median", "maximum", "paper's best (11.1 %)"}
+    assert found["mean"].get_ydata() == pytest.approx(curve().mean)
+    assert found["paper's best (11.1 %)"].get_xydata().tolist() == [[6, 11.1], [7, 11.1]]
+    assert figure.axes[0].get_yscale() == "log"
+
+
+def test_several_curves_are_told_apart():
+    figure = orders.draw([curve(), curve("even 0, fresh inputs"), curve("random 0, held inputs")])
+    found = lines(figure)
+    assert {"random 0, fresh inputs", "even 0, fresh inputs", "random 0, held inputs"} < set(found)
+    assert len({line.get_color() for line in found.values()}) == 4
+
+
+def test_a_curve_goes_by_rising_order():
+    sources = [Source("a", 2, {"evaluation": Scored(10.0)}), Source("a", 1, {"evaluation": Scored(40.0)})]
+    numbers = orders.numbers(orders.select(sources, figure_settings("orders")))
+    assert numbers["a/order"].values.tolist() == [1, 2]
+    assert numbers["a/mean"].values.tolist() == [40.0, 10.0]
+    assert numbers["a/mean"].units == "%"
+
+
+def sources(name):
+    return [Source("", None, {role.partition("/")[2]: record for role, record in figure_records(name).items()})]
+
+
+def test_predictions_start_afresh_from_the_true_state():
+    data, predictor = _trajectories(7), _predictor()
+    starts, segments = restarted(predictor, data.x, data.u, 3)
+    assert starts == [0, 3, 6]
+    assert [segment.shape[1] for segment in segments] == [4, 4, 2]
+    for k, segment in zip(starts, segments, strict=True):
+        whole = predictor.predict(data.x[:, k], data.u[:, k:])
+        assert segment == pytest.approx(whole[:, : segment.shape[1]])
+    one_piece = restarted(predictor, data.x, data.u, 100)
+    assert one_piece[0] == [0]
+    assert one_piece[1][0] == pytest.approx(predictor.predict(data.x[:, 0], data.u))
+
+
+def test_every_restart_is_visible():
+    shown = random_input.select(sources("random-input"), figure_settings("random-input"))
+    figure = random_input.draw(shown)
+    assert len(figure.axes) == 3
+    for i, axes in enumerate(figure.axes):
+        marks = [line for line in axes.lines if len(line.get_xdata()) == 2 and len(set(line.get_xdata())) == 1]
+        assert [line.get_xdata()[0] for line in marks] == pytest.approx([0.03, 0.06])
+        dots = [line for line in axes.lines if line.get_marker() == "o"]
+        assert [dot.get_ydata()[0] for dot in dots] == [segment[0, i] for segment in shown.predicted]
+        true = next(line for line in axes.lines if line.get_label() == "true")
+        assert true.get_ydata().tolist() == shown.true[:, i].tolist()
+    numbers = random_input.numbers(shown)
+    assert numbers["segment"].values.tolist() == [0] * 4 + [1] * 4 + [2] * 2
+    assert numbers["segment time"].values[[3, 4]] == pytest.approx(
+        [0.03, 0.03]
+    )  # the end of one, the start of the next
+    error = np.linalg.norm(shown.predicted[1][1:] - shown.true[4:7]) / np.linalg.norm(shown.true[4:7])
+    assert numbers["segment rmse"].values[1] == pytest.approx(100 * error)
+
+
+def test_a_prediction_that_explodes_is_refused():
+    records = {"predictor": _predictor(growth=1e200), "trajectories": _trajectories(7)}
+    with np.errstate(all="ignore"), pytest.raises(InvalidValueError, match=r"plot\.restart"):
+        random_input.select([Source("", None, records)], figure_settings("random-input"))
+
+
+def test_eigenvalues_of_a_matrix_and_their_rates():
+    shown = spectrum.select([Source("", None, {"predictor": _predictor()})], figure_settings("spectrum"))
+    assert shown.copies == 1
+    assert np.sort_complex(shown.eigenvalues) == pytest.approx(np.sort_complex(np.linalg.eigvals(_predictor().A)))
+    assert np.exp(shown.rates * 0.01) == pytest.approx(shown.eigenvalues)
+    circle, plane = spectrum.draw(shown).axes
+    points = [line for line in circle.lines if line.get_marker() in ("o", "^")]
+    assert sum(len(line.get_xdata()) for line in points) == 8
+    arc = circle.lines[0].get_xydata()
+    assert np.hypot(*arc.T) == pytest.approx(1)
+    (x0, x1), (y0, y1) = circle.get_xlim(), circle.get_ylim()
+    assert (y1 - y0) / (x1 - x0) == pytest.approx(circle.get_box_aspect())  # a circle looks like one
+    assert all(x0 <= z.real <= x1 and y0 <= z.imag <= y1 for z in shown.eigenvalues)
+    assert "1/s" in plane.get_xlabel()
+
+
+def test_eigenvalues_of_modes_are_those_of_one_block():
+    predictor = _looked_up()
+    assert isinstance(predictor.A, Modes)
+    shown = spectrum.select([Source("", None, {"predictor": predictor})], figure_settings("spectrum"))
+    assert (shown.copies, len(shown.rates)) == (2, 3)
+    assert np.sort_complex(shown.eigenvalues) == pytest.approx(np.sort_complex(np.linalg.eigvals(predictor.A.block)))
+    assert set(spectrum.numbers(shown)["copies"].values) == {2.0}
+
+
+def test_growing_eigenvalues_are_told_apart_and_a_zero_has_no_rate():
+    A = np.diag([1.5, 0.5, 0.0])
+    found = np.linalg.eigvals(A)
+    with np.errstate(divide="ignore"):
+        shown = spectrum.Spectrum(found.astype(complex), np.log(found.astype(complex)), 1)
+    circle, plane = spectrum.draw(shown).axes
+    growing = [line for line in circle.lines if line.get_marker() == "^"]
+    assert growing[0].get_xdata().tolist() == [1.5]
+    assert sum(len(line.get_xdata()) for line in plane.lines if line.get_marker() in ("o", "^")) == 2
+
+
+def test_random_input_takes_any_predictor(plant):
+    """It asks for states and inputs, not for the method."""
+    data = _trajectories(7)
+    dmd = edmd.fit(data, edmd.basis_from_data(data, "states", 1))
+    shown = random_input.select(
+        [Source("", None, {"predictor": dmd, "trajectories": data})], Plot("random-input", "png", "", restart=2)
+    )
+    assert len(shown.predicted) == 4
+    assert isinstance(data, Trajectories)
