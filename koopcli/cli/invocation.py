@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from koopcli.config.experiment import Changes, Experiment, flat, load_experiment, parse_set
-from koopcli.config.samples import OF_VEHICLE
-from koopcli.config.settings import UNUSED, FitEdmd, FitEigen
 from koopcli.console import Console, show_table
 from koopcli.errors import UnknownNameError, UsageError
 
@@ -69,12 +67,12 @@ class Invocation:
     ) -> None:
         """Make ``task`` and print its name, or print the plan.
 
-        ``reads``: settings, or beginnings of them, that matter beside those of the stages.
+        ``reads``: settings that matter beside those of the stages.
         """
+        from koopcli.stages.effects import why_idle
+
         for name, _ in flat(self.changes):
-            if any(f"{name}.".startswith(f"{one}.") for one in reads):
-                continue
-            if idle := why_idle(name, self.experiment, [task]):
+            if idle := why_idle(name, self.experiment, [task], reads):
                 raise UsageError(f"{name} changes nothing here: {idle}")
         if dry_run:
             show_plan(self.pipeline.plan(task), as_json=as_json)
@@ -112,67 +110,6 @@ def begin(
     loaded = load_experiment(experiment, changes)
     console, shelf = open_store(store)
     return Invocation(Pipeline(shelf, console), console, loaded, changes)
-
-
-def why_idle(name: str, experiment: Experiment, tasks: Sequence[Task]) -> str | None:
-    """Why the setting ``name`` has no effect on any of ``tasks``, or None where it has one."""
-    section, _, key = name.partition(".")
-    behind = [step for task in tasks for step in task.upstream()]
-    stages = {step.stage for step in behind}
-    by_stage = ("simulate", "fit-edmd", "fit-eigen", "baseline", "evaluate")
-    tested = _test_samples(behind)
-    trained = _samples(behind) - tested
-    of_nothing = {
-        **dict.fromkeys(by_stage, section not in stages),
-        **dict.fromkeys(("plot", "reproduce"), True),
-        "sample": not (trained or tested),
-        "test": not tested,
-    }
-    if tasks and of_nothing.get(section) and not (section in ("sample", "test") and "." in key):
-        drawn = tasks[0].stage == "plot"
-        return f"the figure '{tasks[0].settings.figure}' draws nothing of it" if drawn else "nothing is made by it"
-    if section in ("vehicle", "simulate"):
-        plants = {step.settings.plant for step in behind if step.stage == "simulate"}
-        by_energy = any(
-            key in (*OF_VEHICLE, "name") and hasattr(step.settings, OF_VEHICLE[0])
-            for step in behind
-            if step.stage == "sample"
-        )
-        if not plants and not by_energy:
-            return "only kinds of sample by kinetic energy depend on the vehicle, through its m and Jzz"
-        unused = [plant for plant in plants if any(f"{name}.".startswith(f"{one}.") for one in UNUSED[plant])]
-        if plants and len(unused) == len(plants):
-            return f"the plant '{unused[0]}' has no use for it"
-    if section in ("sample", "test") and "." in key:
-        kind = key.partition(".")[0]
-        relevant = tested if section == "test" else trained or tested
-        if kind not in {one.settings.kind for one in relevant}:
-            return f"no {section} of kind '{kind}' is used"
-    fits: dict[str, tuple[FitEdmd | FitEigen, str]] = {
-        "fit-edmd": (experiment.fit_edmd, "basis"),
-        "fit-eigen": (experiment.fit_eigen, "boundary"),
-    }
-    if section in fits:
-        settings, chosen = fits[section]
-        if getattr(settings.settled(), key) != getattr(settings, key):
-            return f"{section}.{chosen} '{getattr(settings, chosen)}' has no use for it"
-    return None
-
-
-def _samples(behind: Sequence[Task]) -> set[Task]:
-    return {step for step in behind if step.stage == "sample"}
-
-
-def _test_samples(behind: Sequence[Task]) -> set[Task]:
-    """The samples that evaluations and figures among ``behind`` test on."""
-    tests = [
-        task
-        for step in behind
-        if step.stage in ("evaluate", "plot")
-        for role, task in step.inputs
-        if role.rpartition("/")[2] == "trajectories"
-    ]
-    return {sample for test in tests for sample in _samples(list(test.upstream()))}
 
 
 def open_store(store: Path | None) -> tuple[Console, Any]:

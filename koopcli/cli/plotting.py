@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from koopcli.figures.registry import FigureKind
     from koopcli.stages.pipeline import Artefact
 
-UNAFFECTED = ("test", "plot")  # what a figure is told beside a named predictor
-
 
 def plot(
     figure: Annotated[str | None, typer.Argument(help="Name of the figure; --list shows them.")] = None,
@@ -67,7 +65,7 @@ def plot(
     if artefacts and kind.takes == "nothing":
         raise UsageError(f"the figure '{figure}' draws no artefact: leave out {' '.join(artefacts)}")
     if artefacts:
-        told = UNAFFECTED if kind.takes == "predictor" else ()
+        told = drawn.TOLD_BESIDE if kind.takes == "predictor" else ()
         sources = [call.named(one, drawn.TAKES[kind.takes], f"what '{figure}' draws", told) for one in artefacts]
     else:
         for name, _ in flat(call.changes):

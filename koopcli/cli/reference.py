@@ -43,8 +43,8 @@ def _settings() -> Iterator[str]:
     """Every setting that --set and an experiment file take, from the declarations themselves."""
     yield "## Settings\n"
     yield "For `--set SECTION.KEY=VALUE` and for experiment files; values are TOML. `vehicle.name` chooses a vehicle.\n"
-    yield "`test.box`, `test.point` and `test.ball` take what the samples of those kinds take; a setting written without"
-    yield "its kind, such as `sample.seed`, holds for the kind in use.\n"
+    yield "`test.box`, `test.point` and `test.ball` take what samples of those kinds take; a setting without its kind,"
+    yield "such as `sample.seed`, holds for the kind in use.\n"
     yield "| setting | default | allowed | meaning |\n|---|---|---|---|"
     for section, cls in DECLARED:
         hints = get_type_hints(cls)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,15 +12,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from koopcli.cli.invocation import Invocation, begin, print_json, show_plan, why_idle
+from koopcli.cli.invocation import Invocation, begin, print_json, show_plan
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption
-from koopcli.config.experiment import SECTIONS, Experiment, flat, load_experiment, nested
+from koopcli.config.experiment import SECTIONS, flat, load_experiment, nested
 from koopcli.console import show_table
 from koopcli.errors import UsageError
 
 if TYPE_CHECKING:
-    from koopcli.reproduction.report import Method, Run, Table
-    from koopcli.stages.pipeline import Artefact
+    from koopcli.reproduction.illustrations import Illustration
+    from koopcli.reproduction.report import Method, Run
 
 MethodName = Literal["all", "edmd", "eigen"]
 NOT_HERE = ("sample.kind", "test.kind", "simulate.plant", "baseline.kind")
@@ -27,11 +28,11 @@ NOT_HERE = ("sample.kind", "test.kind", "simulate.plant", "baseline.kind")
 
 @dataclass(frozen=True)
 class _Part:
-    """One method of a reproduction with its runs, and the pictures of each with their captions."""
+    """One method of a reproduction with its runs and its pictures."""
 
     method: Method
     runs: list[Run]
-    pictures: list[tuple[Artefact, str]]
+    illustrations: list[Illustration]
 
 
 def reproduce(
@@ -51,9 +52,9 @@ def reproduce(
     """Reproduce the paper at full size and put its figures beside those found here: EDMD over orders, training grids
     and test inputs; eigenfunctions over readings of the text, two tyres, cuts, grip and baselines.
 
-    Some two minutes and 300 MB for both. What --set changes is shown beside the unmodified run. The tables, the
-    figures and the names of all artefacts are written to a file, whose path is printed. All of it is pinned, with what
-    it was made from.
+    Some two minutes and 300 MB for both. What --set changes is shown beside the unmodified run. It ends with
+    report.html, whose path is printed: one page with the tables and every figure, each with the command that makes it.
+    All of it is pinned, with what it was made from.
 
     Example: koop reproduce eigen --set vehicle.mu_scale=0.8
     """
@@ -62,30 +63,30 @@ def reproduce(
     base = "smoke" if smoke else experiment
     call = begin(store, base, set_, SECTIONS)
     from koopcli.reproduction import report
+    from koopcli.reproduction.illustrations import illustrate
     from koopcli.reproduction.registry import METHODS
 
     chosen = list(METHODS.values()) if method == "all" else [METHODS[method]]
     _refuse(call, chosen)
-    runs = {one.name: _experiments(call, base, one) for one in chosen}
+    runs = {one.name: _runs(call, base, one) for one in chosen}
+    wanted = {one.name: [task for run in runs[one.name] for task in report.tasks(one, run)] for one in chosen}
     if dry_run:
-        tasks = [task for one in chosen for _, there in runs[one.name] for _, task in one.cells(there)]
-        steps = {step.task: step for task in tasks for step in call.pipeline.plan(task)}
+        steps = {step.task: step for tasks in wanted.values() for task in tasks for step in call.pipeline.plan(task)}
         show_plan(list(steps.values()), as_json=as_json)
         return
-    for one in chosen:
-        for _, there in runs[one.name]:
-            for _, task in one.cells(there):
-                call.pipeline.check(task)
+    for task in (task for tasks in wanted.values() for task in tasks):
+        call.pipeline.check(task)
     parts = []
     for one in chosen:
-        done = [report.run_cells(one, there, call.pipeline, label) for label, there in runs[one.name]]
-        drawn = [(call.pipeline.make(p.task), p.caption) for run in done for p in one.pictures(run, "png")]
-        parts.append(_Part(one, done, drawn))
+        done = [report.run_cells(one, run, call.pipeline) for run in runs[one.name]]
+        parts.append(_Part(one, done, illustrate(one, done, call.pipeline)))
     _finish(call, method, parts, as_json=as_json)
 
 
 def _refuse(call: Invocation, chosen: Sequence[Method]) -> None:
     """Refuse what the experiments fix, sweep over or have no use for."""
+    from koopcli.stages.effects import why_idle
+
     for name, _ in flat(call.changes):
         if name.startswith("fit-") and (idle := why_idle(name, call.experiment, [])):
             raise UsageError(f"{name} changes nothing here: {idle}")
@@ -102,17 +103,22 @@ def _refuse(call: Invocation, chosen: Sequence[Method]) -> None:
             raise UsageError(f"--set {name}: say which, {section}.{kinds.format(key)}")
 
 
-def _experiments(call: Invocation, base: str, method: Method) -> list[tuple[str, Experiment]]:
+def _runs(call: Invocation, base: str, method: Method) -> list[Run]:
     """The unmodified experiment, and the modified one beside it; a change of the sweep itself applies to both."""
+    from koopcli.reproduction.report import Run
+
     plan = {section: values for section, values in call.changes.items() if section == "reproduce"}
     used = [(name, value) for name, value in flat(call.changes) if method.uses(name)]
-    changed = [f"{name}={value}" for name, value in used if not name.startswith("reproduce.")]
-    runs = [("here", load_experiment(base, plan))]
-    return [*runs, (" ".join(changed), load_experiment(base, nested(used)))] if changed else runs
+    swept = tuple(f"{name}={value}" for name, value in used if name.startswith("reproduce."))
+    changed = tuple(f"{name}={value}" for name, value in used if not name.startswith("reproduce."))
+    runs = [Run("here", load_experiment(base, plan), (), base, swept)]
+    if changed:
+        runs.append(Run(" ".join(changed), load_experiment(base, nested(used)), (), base, (*swept, *changed)))
+    return runs
 
 
 def _finish(call: Invocation, name: str, parts: Sequence[_Part], *, as_json: bool) -> None:
-    """Tables on stderr, the same with all details in a file, its path on stdout."""
+    """Tables on stderr, the same with all figures on a page, its path on stdout."""
     from koopcli.store.pins import pin
 
     for part in parts:
@@ -120,15 +126,19 @@ def _finish(call: Invocation, name: str, parts: Sequence[_Part], *, as_json: boo
             show_table(table.header, table.rows, title=table.title, file=sys.stderr)
         for note in part.method.notes(part.runs):
             call.console.note(note)
+        for one in part.illustrations:
+            if one.drawing is None:
+                call.console.warn(f"the figure '{one.figure}' is not drawn: {one.reason}")
     label = f"reproduce-{name}-{_identity(parts)}"
     made = [scored.record for part in parts for run in part.runs for scored in run.scored]
-    made += [drawn.record for part in parts for drawn, _ in part.pictures]
+    made += [one.record for part in parts for one in part.illustrations if one.record is not None]
     pin(call.pipeline.store, label, call.pipeline.with_inputs(made))
     call.console.note(f"pinned as {label}")
     path = _write_report(call, name, parts)
     if as_json:
         runs = [_run_json(part.method, run) for part in parts for run in part.runs]
-        print_json({"name": path.stem, "path": str(path), "runs": runs})
+        figures = [_figure_json(part.method, one) for part in parts for one in part.illustrations]
+        print_json({"name": path.parent.name, "path": str(path), "runs": runs, "figures": figures})
     else:
         print(path)
 
@@ -139,38 +149,53 @@ def _identity(parts: Sequence[_Part]) -> str:
 
 
 def _write_report(call: Invocation, name: str, parts: Sequence[_Part]) -> Path:
+    from koopcli import __version__
+    from koopcli.reproduction.page import Section, page
     from koopcli.reproduction.report import full_table
+    from koopcli.reproduction.turnable import bundle
     from koopcli.store.files import publish, storage_errors
 
     root = call.pipeline.store.root
-    path = root / "reports" / f"{name}-{_identity(parts)}.md"
-    lines: list[str] = []
-    content: dict[Path, bytes] = {}
-    for part in parts:
-        lines += [f"# Paper versus here: {part.method.title}", ""]
-        for table in [*part.method.tables(part.runs), full_table(part.method, part.runs)]:
-            lines += [f"## {table.title}", "", *_markdown(table), ""]
-        lines += ["## What it means", "", *(f"* {note}" for note in part.method.notes(part.runs)), ""]
-        for drawn, caption in part.pictures:
-            picture = path.with_name(f"{path.stem}-{len(content)}.png")
-            content[picture] = drawn.content.image
-            lines += [f"![{caption}]({picture.name})", "", caption, ""]
-    content[path] = "\n".join(lines).encode()
+    path = root / "reports" / f"{name}-{_identity(parts)}" / "report.html"
+    sections = [
+        Section(
+            part.method.name,
+            f"{part.method.title[0].upper()}{part.method.title[1:]}",
+            part.method.tables(part.runs),
+            part.method.notes(part.runs),
+            part.illustrations,
+            full_table(part.method, part.runs),
+        )
+        for part in parts
+    ]
+    library = bundle()
+    if library is None:
+        call.console.note("the error map of the report is a picture; pip install 'koopcli[report]' for one to turn")
+    command = shlex.join(["koop", "reproduce", name, *_told(parts)])
+    content = page(sections, command, f"koop {__version__}", library).encode()
     with storage_errors(root):
-        for target, what in content.items():
-            if not target.is_file() or target.read_bytes() != what:
-                publish(target, what, root / "tmp")
+        if not path.is_file() or path.read_bytes() != content:
+            publish(path, content, root / "tmp")
     return path
 
 
-def _markdown(table: Table) -> list[str]:
-    rows = [table.header, ["---", *("---:" for _ in table.header[1:])], *table.rows]
-    return [f"| {' | '.join(row)} |" for row in rows]
+def _told(parts: Sequence[_Part]) -> list[str]:
+    """Experiment and changes, as they are said on the command line."""
+    runs = [run for part in parts for run in part.runs]
+    experiment = [] if runs[0].base == "paper" else ["--experiment", runs[0].base]
+    changes = dict.fromkeys(change for run in runs for change in run.changes)
+    return [*experiment, *(word for change in changes for word in ("--set", change))]
 
 
 def _run_json(method: Method, run: Run) -> dict[str, Any]:
     cells = [{**vars(s.cell), "name": s.record.name, **s.figures} for s in run.scored]
     return {"method": method.name, "run": run.label, "evaluations": cells}
+
+
+def _figure_json(method: Method, one: Illustration) -> dict[str, Any]:
+    name = None if one.record is None else one.record.name
+    about = {"figure": one.figure, "name": name, "caption": one.caption, "command": one.command}
+    return {"method": method.name, "run": one.run, **about}
 
 
 def register(app: typer.Typer) -> None:

@@ -16,10 +16,13 @@ LARGEST_SHOWN = 0.98  # quantile of the errors where the colours end
 
 @dataclass(frozen=True)
 class Balls:
-    """``x0`` (n, n_x) with its ``rmse`` (n,) in percent, the largest errors last, and ``top``, where colours end."""
+    """``x0`` (n, n_x) with its ``rmse`` (n,) in percent and ``distance`` (n,) to the data in half-widths of their box,
+    the largest errors last; ``top`` is where colours end.
+    """
 
     x0: FloatArray
     rmse: FloatArray
+    distance: FloatArray
     top: float
     channels: Channels
 
@@ -38,14 +41,15 @@ def balls(evaluation: Evaluation) -> Balls:
     """The initial states of an evaluation. Raises ``InvalidValueError`` where every prediction diverged."""
     shown = any_error(evaluation.rmse, evaluation.diverged)
     order = np.argsort(evaluation.rmse[shown], kind="stable")
-    x0, rmse = evaluation.x0[shown][order], evaluation.rmse[shown][order]
+    x0, rmse, distance = (a[shown][order] for a in (evaluation.x0, evaluation.rmse, evaluation.distance))
     top = float(np.quantile(rmse, LARGEST_SHOWN)) or 1.0
-    return Balls(x0, rmse, top, evaluation.state_channels)
+    return Balls(x0, rmse, distance, top, evaluation.state_channels)
 
 
 def columns(shown: Balls) -> Mapping[str, Array]:
-    """Every initial state with its error."""
+    """Every initial state with its error and its distance to the data."""
     return {
         **state_columns(shown.x0, shown.channels, "trajectory", "{}_0"),
         "rmse": column(shown.rmse, "trajectory", "%"),
+        "distance": column(shown.distance, "trajectory", "half-widths"),
     }

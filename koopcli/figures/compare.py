@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
+from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import Source, any_error, column
-from koopcli.figures.style import COLOURS, COLUMN, plain_numbers, style
+from koopcli.figures.style import COLUMN, plain_numbers, style
 from koopcli.records import Array, FloatArray
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
+from koopcli.figures.colours import COLOURS, PAPER
 from koopcli.figures.drawing import Source, any_error, column
-from koopcli.figures.style import COLOURS, COLUMN, PAPER, plain_numbers, style
+from koopcli.figures.style import COLUMN, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray
 
 GROUPS = 20  # of equally many trajectories, by distance

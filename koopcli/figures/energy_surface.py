@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
 from koopcli.errors import InvalidValueError
+from koopcli.figures.colours import COLOURS, GUIDE
 from koopcli.figures.drawing import Source, column, state_columns
-from koopcli.figures.style import COLOURS, COLUMN, GUIDE, axis_label, in_space, style
+from koopcli.figures.style import COLUMN, axis_label, in_space, style
 from koopcli.records import Array, Channels, FloatArray, Sample
 from koopcli.simulation.sampling import sphere_mesh
 

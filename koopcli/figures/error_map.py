@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
 from koopcli.figures.balls import Balls, balls, columns
+from koopcli.figures.colours import SHADES
 from koopcli.figures.drawing import Source
-from koopcli.figures.style import COLUMN, SHADES, axis_label, in_space, style
+from koopcli.figures.style import COLUMN, axis_label, in_space, style
 from koopcli.records import Array
 
 PALEST = 0.2  # opacity of a ball without error

@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
 from koopcli.figures.balls import Balls, balls, columns
+from koopcli.figures.colours import SHADES, TRAINING
 from koopcli.figures.drawing import Source, column, state_columns
-from koopcli.figures.style import COLUMN, SHADES, TRAINING, axis_label, style
+from koopcli.figures.style import COLUMN, axis_label, style
 from koopcli.records import Array, FloatArray, Trajectories
 
 PATHS = 500  # training trajectories drawn at most

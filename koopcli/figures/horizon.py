@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
+from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import Source, any_error, column
-from koopcli.figures.style import COLOURS, COLUMN, looks, plain_numbers, style
+from koopcli.figures.style import COLUMN, looks, plain_numbers, style
 from koopcli.records import Array, FloatArray, Trajectories
 
 QUANTILES = {"lower": 0.1, "median": 0.5, "upper": 0.9}

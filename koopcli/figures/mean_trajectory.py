@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
+from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import Source, any_error, column, state_columns
-from koopcli.figures.style import COLOURS, COLUMN, axis_label, style
+from koopcli.figures.style import COLUMN, axis_label, style
 from koopcli.records import Array, Channels, FloatArray, Trajectories
 
 

@@ -14,8 +14,9 @@ from matplotlib.ticker import MaxNLocator
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
 from koopcli.config.settings import Plot
 from koopcli.errors import InvalidValueError
+from koopcli.figures.colours import COLOURS, MARKERS, PAPER
 from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLOURS, COLUMN, MARKERS, PAPER, plain_numbers, style
+from koopcli.figures.style import COLUMN, plain_numbers, style
 from koopcli.records import Array, FloatArray
 
 

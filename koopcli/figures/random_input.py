@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
 from koopcli.errors import InvalidValueError
+from koopcli.figures.colours import COLOURS, GUIDE
 from koopcli.figures.drawing import Source, column, state_columns
-from koopcli.figures.style import COLOURS, COLUMN, GUIDE, axis_label, style
+from koopcli.figures.style import COLUMN, axis_label, style
 from koopcli.koopman.metrics import rmse
 from koopcli.koopman.restarts import restarted
 from koopcli.records import Array, Channels, FloatArray, Trajectories

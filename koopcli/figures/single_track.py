@@ -12,8 +12,9 @@ from matplotlib.patches import Arc, FancyBboxPatch
 from matplotlib.transforms import Affine2D
 
 from koopcli.config.settings import Plot
+from koopcli.figures.colours import COLOURS, GUIDE, PAPER
 from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLOURS, COLUMN, GUIDE, PAPER, style
+from koopcli.figures.style import COLUMN, style
 from koopcli.records import Array, FloatArray
 
 FRONT, REAR = np.array([1.6, 0.0]), np.array([-1.6, 0.0])  # m, as all lengths here

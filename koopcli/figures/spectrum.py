@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
+from koopcli.figures.colours import COLOURS, GUIDE
 from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLOURS, COLUMN, GUIDE, style
+from koopcli.figures.style import COLUMN, style
 from koopcli.koopman.modes import ComplexArray, Modes
 from koopcli.koopman.predictor import Predictor
 from koopcli.records import Array

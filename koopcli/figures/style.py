@@ -13,17 +13,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from mpl_toolkits.mplot3d import Axes3D
 
+from koopcli.figures.colours import COLOURS, DASHES
+
 COLUMN = 3.5  # inches, one column of a two-column page
 
-# Okabe and Ito's palette: distinct to every common form of colour vision
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-MARKERS = ("o", "s", "^", "D", "v", "P")
-DASHES = ("-", "--", ":")
-PAPER = "#000000"
-TRAINING = "#bbbbbb"
-GUIDE = "#888888"  # what is not data: axes through zero, the unit circle, restarts
 NARROW = 200  # ratio of the ends of a logarithmic axis below which 2 and 5 are written too
-SHADES = "viridis_r"  # even in lightness, dark where errors are large
 
 STYLE = {
     "font.size": 8,

@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot, Tyres
+from koopcli.figures.colours import GUIDE
 from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, GUIDE, looks, style
+from koopcli.figures.style import COLUMN, looks, style
 from koopcli.records import Array, FloatArray
 from koopcli.vehicles.tyre import force
 

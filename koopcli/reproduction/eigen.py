@@ -10,7 +10,7 @@ from typing import Any
 from koopcli.config.experiment import DEFAULT_VEHICLE, Experiment, vehicle_named
 from koopcli.config.paper import EIGEN_RMSE
 from koopcli.config.samples import BallSample, EllipsoidSample
-from koopcli.config.settings import FitEigen, ImageFormat, Simulate
+from koopcli.config.settings import FitEigen, Simulate
 from koopcli.records import Meta
 from koopcli.reproduction.eigen_cells import (
     BASELINES,
@@ -22,6 +22,7 @@ from koopcli.reproduction.eigen_cells import (
     cells,
     cut_text,
     evaluated,
+    side_by_side,
     surface,
 )
 from koopcli.reproduction.report import (
@@ -34,19 +35,54 @@ from koopcli.reproduction.report import (
     has_effect,
     score_text,
 )
-from koopcli.stages import drawn
+from koopcli.stages import drawn, recipes
 
 SIZES = (count_text(EllipsoidSample.count), count_text(BallSample.count, BallSample.steps))  # the paper's
 
 
-def pictures(run: Run, image: ImageFormat) -> list[Picture]:
-    """Where the errors of the headline are, and what its mean error looks like."""
-    headline = evaluated(run.experiment, run.experiment.fit_eigen, run.experiment.reproduce.seeds[0])
+def pictures(experiment: Experiment) -> list[Picture]:
+    """Tyres and initial states, then the headline in detail, and beside it the other vehicles."""
+    draw = partial(drawn.figure, image="png", experiment=experiment)
+    seed = experiment.reproduce.seeds[0]
+    (name, there), *others = recipes.vehicles(experiment)
+    headline = evaluated(there, there.fit_eigen, seed)
+    beside = side_by_side(there, seed)
     return [
-        Picture(drawn.figure("error-map", [headline], image, run.experiment), f"RMSE by initial state, {run.label}"),
+        Picture(draw("tyre", []), "Tyre forces of one wheel under its static load."),
         Picture(
-            drawn.figure("mean-trajectory", [headline], image, run.experiment),
-            f"Mean RMSE, {run.label}",
+            draw("energy-surface", [headline.input("predictor").ancestor("sample")]),
+            "Γ: the states of one kinetic energy; each vertex of the mesh is an initial state of the training set.",
+        ),
+        Picture(
+            draw("error-map", [headline]),
+            f"Error by initial state, {name}: each ball is a test state, its size and colour the RMSE.",
+        ),
+        Picture(
+            draw("error-side", [headline]),
+            f"The same from the side, {name}, over the training trajectories: are errors where data are missing?",
+        ),
+        Picture(
+            draw("mean-trajectory", [headline]),
+            f"A trajectory of mean error, {name}. It starts beside the state it predicts: the lift is approximate.",
+        ),
+        Picture(draw("rmse-histogram", [headline]), f"How the errors are distributed, {name}."),
+        Picture(draw("density", [headline]), f"Error against the distance of the initial state to the data, {name}."),
+        Picture(draw("horizon", beside), f"Median error against time, {name}, beside what fits nothing and EDMD."),
+        Picture(draw("compare", beside), f"Errors beside what fits nothing and EDMD of the same trajectories, {name}."),
+        Picture(draw("spectrum", [headline.input("predictor")]), f"Eigenvalues of the lifted system, {name}."),
+        *(picture for other, there in others for picture in _elsewhere(other, there, seed)),
+    ]
+
+
+def _elsewhere(name: str, there: Experiment, seed: int) -> list[Picture]:
+    """What is shown of a vehicle beside the main one."""
+    draw = partial(drawn.figure, image="png", experiment=there)
+    headline = evaluated(there, there.fit_eigen, seed)
+    return [
+        Picture(draw("error-side", [headline]), f"Error by initial state from the side, {name}."),
+        Picture(
+            draw("compare", side_by_side(there, seed)),
+            f"Errors beside what fits nothing and EDMD of the same trajectories, {name}.",
         ),
     ]
 

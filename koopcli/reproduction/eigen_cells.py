@@ -88,6 +88,15 @@ def evaluated(experiment: Experiment, fit: FitEigen, seed: int, seconds: float |
     return _scored(there, recipes.fit_eigen(there, _training(there)), seed)
 
 
+def side_by_side(experiment: Experiment, seed: int) -> list[Task]:
+    """Evaluations on the test states of a seed: the experiment's own reading, and what it is set beside."""
+    predictors = recipes.beside(experiment, _training(experiment))
+    return [
+        evaluated(experiment, experiment.fit_eigen, seed),
+        *(_scored(experiment, predictor, seed) for predictor in predictors),
+    ]
+
+
 def _training(experiment: Experiment) -> Task:
     surface(experiment)
     return recipes.simulation(experiment, plant="slips")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from koopcli.config.experiment import Experiment
-from koopcli.config.settings import UNUSED, ImageFormat
+from koopcli.config.settings import UNUSED
 from koopcli.records import Meta
 from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline
@@ -36,11 +36,16 @@ class Scored:
 
 @dataclass(frozen=True)
 class Run:
-    """Every cell of an experiment, scored. ``label`` tells runs apart: "here", or what was changed."""
+    """Every cell of an experiment, scored. ``label`` tells runs apart: "here", or what was changed.
+
+    ``base``: what the experiment was called on the command line, ``changes``: what ``--set`` changed of it.
+    """
 
     label: str
     experiment: Experiment
     scored: tuple[Scored, ...]
+    base: str = "paper"
+    changes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -63,24 +68,30 @@ class Method:
     """What is shown, paper versus here first."""
     notes: Callable[[Sequence[Run]], list[str]]
     """What the tables mean."""
-    pictures: Callable[[Run, ImageFormat], list[Picture]]
-    """The figures of a run."""
+    pictures: Callable[[Experiment], list[Picture]]
+    """The figures of an experiment."""
     fixed: Mapping[str, str]
     """Settings that the method sweeps over or fixes, and what to write instead."""
     uses: Callable[[str], bool]
     """Whether a setting has an effect on the method."""
 
 
-def run_cells(method: Method, experiment: Experiment, pipeline: Pipeline, label: str) -> Run:
-    """Make or find every cell, with a progress display."""
+def tasks(method: Method, run: Run) -> list[Task]:
+    """Everything a run makes: the evaluation of every cell, then the pictures."""
+    pictures = method.pictures(run.experiment)
+    return [*(task for _, task in method.cells(run.experiment)), *(picture.task for picture in pictures)]
+
+
+def run_cells(method: Method, run: Run, pipeline: Pipeline) -> Run:
+    """Make or find every cell of a run that has none yet, with a progress display."""
     scored = []
-    cells = list(method.cells(experiment))
-    with pipeline.reporter.progress(f"reproduce {method.name}, {label}") as progress:
+    cells = list(method.cells(run.experiment))
+    with pipeline.reporter.progress(f"reproduce {method.name}, {run.label}") as progress:
         for i, (cell, task) in enumerate(cells):
             progress(i, len(cells))
             artefact = pipeline.make(task)
             scored.append(Scored(cell, artefact.figures, artefact.record))
-    return Run(label, experiment, tuple(scored))
+    return replace(run, scored=tuple(scored))
 
 
 def has_effect(name: str, *, plant: str, swept: Sequence[str], foreign: Sequence[str]) -> bool:

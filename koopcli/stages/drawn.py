@@ -24,6 +24,7 @@ TAKES: dict[str, tuple[str, ...]] = {
     "sample": ("sample",),
     "nothing": (),
 }
+TOLD_BESIDE = ("test", "plot")  # sections that matter beside a named predictor
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from koopcli.config.settings import ImageFormat
 from koopcli.errors import InvalidValueError
 from koopcli.figures import style
+from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import Drawing, sources_of
 from koopcli.figures.registry import FIGURES, drawing
 from koopcli.stages.drawn import MADE, TAKES, TOLD
@@ -171,7 +172,7 @@ def test_many_lines_are_all_different():
 
 def test_colours_are_told_apart_in_print():
     """Neighbours in the list differ in lightness, so that they do in black and white too."""
-    r, g, b = np.array([mpl.colors.to_rgb(colour) for colour in style.COLOURS[:3]]).T
+    r, g, b = np.array([mpl.colors.to_rgb(colour) for colour in COLOURS[:3]]).T
     lightness = 0.2126 * r + 0.7152 * g + 0.0722 * b
     assert len(set(np.round(lightness, 2))) == 3
 

@@ -1,0 +1,106 @@
+"""The pictures of a report, each with the command that makes it and how it came about."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from koopcli.config.experiment import flat, parse_set
+from koopcli.errors import InvalidValueError, UsageError
+from koopcli.figures.drawing import Drawing
+from koopcli.figures.registry import FIGURES
+from koopcli.reproduction.report import Method, Picture, Run
+from koopcli.stages import drawn
+from koopcli.stages.base import Task
+from koopcli.stages.effects import why_idle
+from koopcli.stages.pipeline import Pipeline
+from koopcli.store import Record
+
+
+@dataclass(frozen=True)
+class Illustration:
+    """A picture of a report: its ``drawing`` with its ``record`` and those of what it ``draws``, or why there is none.
+
+    ``command`` makes it.
+    """
+
+    figure: str
+    caption: str
+    run: str
+    command: str
+    drawing: Drawing | None
+    record: Record | None
+    draws: tuple[Record, ...]
+    reason: str = ""
+
+
+def illustrate(method: Method, runs: Sequence[Run], pipeline: Pipeline) -> list[Illustration]:
+    """Make or find every picture of a method; one that two runs share is shown once.
+
+    What cannot be drawn, as an evaluation where every prediction diverged, is left out with the reason.
+    """
+    found = []
+    wanted: dict[Task, tuple[Run, Picture]] = {}
+    for run in runs:
+        for picture in method.pictures(run.experiment):
+            wanted.setdefault(picture.task, (run, picture))
+    with pipeline.reporter.progress(f"figures of {method.name}") as progress:
+        for i, (run, picture) in enumerate(wanted.values()):
+            progress(i, len(wanted))
+            found.append(_illustration(run, picture, pipeline))
+    return found
+
+
+def _illustration(run: Run, picture: Picture, pipeline: Pipeline) -> Illustration:
+    name = picture.task.settings.figure
+    try:
+        made = pipeline.make(picture.task)
+    except InvalidValueError as error:
+        return Illustration(name, picture.caption, run.label, "", None, None, (), str(error))
+    main = FIGURES[name].roles[:1]  # the artefact itself comes first
+    inputs = {tuple(key.split("/")): one for key, one in made.record.lineage.items()}
+    names = [one for (_, role), one in sorted(inputs.items(), key=lambda item: int(item[0][0])) if (role,) == main]
+    found = (pipeline.store.record(*one.split("/")) for one in names)
+    draws = tuple(one for one in found if one is not None)
+    return Illustration(
+        name, picture.caption, run.label, command(run, picture, draws), made.content, made.record, draws
+    )
+
+
+def command(run: Run, picture: Picture, draws: Sequence[Record]) -> str:
+    """The command that makes a picture: by the figure's name where that makes it, else of the artefacts it draws."""
+    task, name = picture.task, picture.task.settings.figure
+    kind = FIGURES[name]
+    made = drawn.MADE[kind.made]
+    words = ["koop", "plot", name]
+    try:
+        alone = drawn.figure(name, made.tasks(run.experiment), task.settings.format, run.experiment)
+    except (UsageError, InvalidValueError):  # changes that hold for this method's samples and not for the figure's
+        alone = None
+    if alone == task:
+        words += [] if run.base == "paper" else ["--experiment", run.base]
+        told = list(run.changes)
+    else:
+        words += [record.name for record in draws]
+        told = [one for one in run.changes if kind.takes == "predictor" and one.startswith(drawn.TOLD_BESIDE)]
+    reads = (*made.reads, *(f"plot.{field}" for field in kind.told))
+    for one in told:
+        ((setting, _),) = flat(parse_set([one]))
+        if why_idle(setting, run.experiment, [task], reads) is None:
+            words += ["--set", one]
+    return shlex.join([*words, "-o", f"{name}.{task.settings.format}"])
+
+
+def provenance(one: Illustration) -> Iterator[tuple[str, str]]:
+    """Where a picture comes from, as names and texts; nothing of the machine but its versions."""
+    assert one.record is not None
+    about = one.record.provenance
+    yield "artefact", one.record.name
+    if one.draws:
+        yield "draws", ", ".join(record.name for record in one.draws)
+    yield "made", f"{about['time'].replace('T', ' ')[:16]} UTC in {about['seconds']:.1f} s"
+    packages = {name: version for name, version in about["versions"].items() if name != "koopcli"}
+    koop = about["versions"].get("koopcli", "?")
+    yield "koop", f"{koop} (commit {about['git']})" if about["git"] else koop
+    yield "with", ", ".join([f"Python {about['python']}", *(f"{name} {version}" for name, version in packages.items())])

@@ -1,0 +1,87 @@
+"""Which settings have an effect on what is made: one that has none is refused rather than ignored."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from koopcli.config.experiment import Experiment
+from koopcli.config.samples import OF_VEHICLE
+from koopcli.config.settings import UNUSED, FitEdmd, FitEigen
+from koopcli.stages.base import Task
+
+
+def why_idle(name: str, experiment: Experiment, tasks: Sequence[Task], reads: Sequence[str] = ()) -> str | None:
+    """Why the setting ``name`` has no effect on any of ``tasks``, or None where it has one.
+
+    ``reads``: settings, or sections of them, that have one whatever the stages use.
+    """
+    if any(f"{name}.".startswith(f"{one}.") for one in reads):
+        return None
+    section, _, key = name.partition(".")
+    behind = [step for task in tasks for step in task.upstream()]
+    if section in ("sample", "test"):
+        return _idle_sample(section, key, tasks, behind)
+    stages = {step.stage for step in behind}
+    if tasks and section != "vehicle" and section not in stages - {"plot"}:  # a figure reads what it is told of
+        return _of_nothing(tasks)
+    if section in ("vehicle", "simulate"):
+        return _idle_in_plants(name, key, behind)
+    return _idle_in_fit(section, key, experiment)
+
+
+def _of_nothing(tasks: Sequence[Task]) -> str:
+    drawn = tasks[0].stage == "plot"
+    return f"the figure '{tasks[0].settings.figure}' draws nothing of it" if drawn else "nothing is made by it"
+
+
+def _idle_sample(section: str, key: str, tasks: Sequence[Task], behind: Sequence[Task]) -> str | None:
+    """Of a setting of samples, of one kind or of the kind in use."""
+    tested = _test_samples(behind)
+    relevant = tested if section == "test" else _samples(behind) - tested or tested
+    if "." not in key:
+        return _of_nothing(tasks) if tasks and not relevant else None
+    kind = key.partition(".")[0]
+    return None if kind in {one.settings.kind for one in relevant} else f"no {section} of kind '{kind}' is used"
+
+
+def _idle_in_plants(name: str, key: str, behind: Sequence[Task]) -> str | None:
+    """Of a setting of the vehicle or of its simulation."""
+    plants = {step.settings.plant for step in behind if step.stage == "simulate"}
+    by_energy = any(
+        key in (*OF_VEHICLE, "name") and hasattr(step.settings, OF_VEHICLE[0])
+        for step in behind
+        if step.stage == "sample"
+    )
+    if not plants and not by_energy:
+        return "only kinds of sample by kinetic energy depend on the vehicle, through its m and Jzz"
+    unused = [plant for plant in plants if any(f"{name}.".startswith(f"{one}.") for one in UNUSED[plant])]
+    return f"the plant '{unused[0]}' has no use for it" if plants and len(unused) == len(plants) else None
+
+
+def _idle_in_fit(section: str, key: str, experiment: Experiment) -> str | None:
+    """Of a setting of a fit that another one switches off."""
+    fits: dict[str, tuple[FitEdmd | FitEigen, str]] = {
+        "fit-edmd": (experiment.fit_edmd, "basis"),
+        "fit-eigen": (experiment.fit_eigen, "boundary"),
+    }
+    if section not in fits:
+        return None
+    settings, chosen = fits[section]
+    idle = getattr(settings.settled(), key) != getattr(settings, key)
+    return f"{section}.{chosen} '{getattr(settings, chosen)}' has no use for it" if idle else None
+
+
+def _samples(behind: Sequence[Task]) -> set[Task]:
+    return {step for step in behind if step.stage == "sample"}
+
+
+def _test_samples(behind: Sequence[Task]) -> set[Task]:
+    """The samples that evaluations and figures among ``behind`` test on."""
+    tests = [
+        task
+        for step in behind
+        if step.stage in ("evaluate", "plot")
+        for role, task in step.inputs
+        if role.rpartition("/")[2] == "trajectories"
+    ]
+    return {sample for test in tests for sample in _samples(list(test.upstream()))}
