@@ -24,8 +24,8 @@ smoke: $(VENV)/.installed ## Run both methods on reduced datasets, in a store of
 	$(KOOP) reproduce all --smoke --store "$$store" && \
 	$(KOOP) reproduce all --smoke --store "$$store" 2>/dev/null
 
-test: $(VENV)/.developing ## Run the tests
-	$(BIN)/python -m pytest
+test: $(VENV)/.developing ## Run the tests, on every core
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 check: $(VENV)/.developing ## Lint, types and the direction of imports
 	$(BIN)/ruff format --check .
@@ -61,7 +61,7 @@ $(VENV)/.created:
 	@touch $@
 
 $(VENV)/.installed: pyproject.toml | $(VENV)/.created
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[report]'
 	@touch $@
 
 $(VENV)/.developing: pyproject.toml | $(VENV)/.created

@@ -23,6 +23,8 @@ STORE = (
     "in, or where --store or KOOP_STORE point. koop show NAME tells every setting behind an artefact."
 )
 
+FOLDED_BEYOND = 12  # artefacts named in a command
+
 
 _text = partial(escape, quote=False)
 
@@ -90,11 +92,19 @@ def _figure(one: Illustration, name: str, view: str | None) -> Iterator[str]:
         yield f'<img src="data:image/{one.drawing.format};base64,{image}" alt="{about}">'
     yield f"<figcaption>{_text(one.caption)}{run}"
     if one.drawing is not None:
-        yield f'<p class="command"><code>{_text(one.command)}</code></p>'
+        yield _command(one)
         yield "<details><summary>Where it comes from</summary><dl>"
         yield from (f"<dt>{_text(what)}</dt><dd>{_text(text)}</dd>" for what, text in provenance(one))
         yield "</dl></details>"
     yield "</figcaption></figure>"
+
+
+def _command(one: Illustration) -> str:
+    """The command, folded where it names many artefacts."""
+    code = f"<code>{_text(one.command)}</code>"
+    if len(one.draws) <= FOLDED_BEYOND:
+        return f'<p class="command">{code}</p>'
+    return f"<details><summary>Made of {len(one.draws)} evaluations by</summary>{code}</details>"
 
 
 def _table(table: Table) -> str:
@@ -104,7 +114,7 @@ def _table(table: Table) -> str:
         for row in table.rows
     )
     return (
-        f'<div class="wide"><table><caption>{_text(table.title)}</caption><thead><tr>{head}</tr></thead>'
+        f'<h4>{_text(table.title)}</h4><div class="wide"><table><thead><tr>{head}</tr></thead>'
         f"<tbody>{rows}</tbody></table></div>"
     )
 

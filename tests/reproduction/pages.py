@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 
 
 class Page(HTMLParser):
-    """``tables`` as rows of texts by caption, ``figures`` as texts by name, ``loaded`` the addresses it refers to."""
+    """``tables`` as rows of texts by the heading over them, ``figures`` with their texts, ``loaded`` the addresses used."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -24,8 +24,10 @@ class Page(HTMLParser):
         self.loaded += [about[name] for name in ("src", "href") if name in about]
         if tag == "script":
             self.scripts += 1
+        if tag == "h4":
+            self._caption = ""
         if tag == "table":
-            self._rows, self._caption = [], ""
+            self._rows = []
         elif tag == "tr":
             self._rows.append([])
         elif tag in ("td", "th"):
@@ -43,7 +45,7 @@ class Page(HTMLParser):
             self.tables.setdefault(self._caption, []).extend(self._rows)
 
     def handle_data(self, data):
-        if "caption" in self._inside:
+        if "h4" in self._inside:
             self._caption += data
         elif self._inside[-1:] in (["td"], ["th"]):
             self._rows[-1][-1] += data
