@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 
 
 class Page(HTMLParser):
-    """``tables`` as rows of texts by the heading over them, ``figures`` with their texts, ``loaded`` the addresses used."""
+    """``tables`` as rows of texts by heading, ``figures`` with their texts, ``loaded``: the addresses that are used."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
