@@ -59,7 +59,7 @@ def draw(shown: EnergySurface) -> Figure:
     with style():
         figure = Figure(figsize=(COLUMN, 3.2), layout="constrained")
         axes = figure.add_subplot(projection="3d", computed_zorder=False)
-        in_space(axes, names)
+        in_space(axes, names, zoom=0.95)
         towards = _towards(axes.elev, axes.azim) / shown.semi_axes
         front = shown.x0 @ towards > 0
         axes.scatter(*shown.x0[~front].T, s=4, color=COLOURS[5], alpha=0.45, linewidths=0, depthshade=False, zorder=1)

@@ -40,7 +40,7 @@ def draw(shown: Balls) -> Figure:
         figure = Figure(figsize=(COLUMN, 6.2), layout="constrained")
         space = figure.add_subplot(2, 1, 1, projection="3d")
         space.scatter(*shown.x0[:, :3].T, s=shown.sizes, color=through, depthshade=False, linewidths=0, rasterized=True)
-        in_space(space, names)
+        in_space(space, names, zoom=1.0)
         above = figure.add_subplot(2, 1, 2)
         above.scatter(
             shown.x0[:, 0], shown.x0[:, 1], s=shown.sizes, color=colours, linewidths=0, zorder=3, rasterized=True

@@ -18,6 +18,7 @@ from koopcli.koopman.predictor import Predictor
 from koopcli.records import Array
 
 TALL = 1.4  # height of a panel over its width
+ROUNDING = 1e-9  # of an eigenvalue: one that is 1 neither grows nor decays
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def numbers(shown: Spectrum) -> Mapping[str, Array]:
 
 def draw(shown: Spectrum) -> Figure:
     """Both views; what grows lies outside the circle and to the right of the line."""
-    growing = np.abs(shown.eigenvalues) > 1
+    growing = np.abs(shown.eigenvalues) > 1 + ROUNDING
     with style():
         figure = Figure(figsize=(COLUMN, 2.7), layout="constrained")
         circle, plane = figure.subplots(1, 2)

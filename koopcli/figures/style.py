@@ -56,10 +56,10 @@ def plain_numbers(axis: Axis) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def in_space(axes: Axes3D, names: Sequence[str]) -> None:
+def in_space(axes: Axes3D, names: Sequence[str], zoom: float) -> None:
     """Labels, the point of view and the box of axes in space, so that nothing is cut off at one column."""
     axes.view_init(elev=24, azim=-58)
-    axes.set_box_aspect((1, 1, 0.85), zoom=0.95)
+    axes.set_box_aspect((1, 1, 0.85), zoom=zoom)
     for axis, name in zip((axes.xaxis, axes.yaxis, axes.zaxis), names, strict=False):
         axis.set_label_text(name)
         axis.labelpad = -6 if axis is axes.zaxis else -7
