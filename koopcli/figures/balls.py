@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from koopcli.figures.drawing import any_error, column, state_columns
+from koopcli.figures.drawing import Source, column, state_columns, with_error
 from koopcli.koopman.evaluation import Evaluation
 from koopcli.records import Array, Channels, FloatArray
 
@@ -37,9 +37,10 @@ class Balls:
         return "max" if self.rmse.max() > self.top else "neither"
 
 
-def balls(evaluation: Evaluation) -> Balls:
+def balls(source: Source) -> Balls:
     """The initial states of an evaluation. Raises ``InvalidValueError`` where every prediction diverged."""
-    shown = any_error(evaluation.rmse, evaluation.diverged)
+    evaluation: Evaluation = source.records["evaluation"]
+    (shown,) = with_error([source])
     order = np.argsort(evaluation.rmse[shown], kind="stable")
     x0, rmse, distance = (a[shown][order] for a in (evaluation.x0, evaluation.rmse, evaluation.distance))
     top = float(np.quantile(rmse, LARGEST_SHOWN)) or 1.0

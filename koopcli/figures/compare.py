@@ -10,16 +10,18 @@ from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
 from koopcli.figures.colours import COLOURS
-from koopcli.figures.drawing import Source, any_error, column
+from koopcli.figures.drawing import Source, column, with_error
 from koopcli.figures.style import COLUMN, plain_numbers, style
-from koopcli.records import Array, FloatArray
+from koopcli.records import Array, BoolArray, FloatArray
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 @dataclass(frozen=True)
 class Spread:
-    """The RMSE of one predictor's trajectories in percent: ``quantiles`` (5,) and ``mean``; how many ``diverged``."""
+    """The RMSE of one predictor's trajectories in percent: ``quantiles`` (5,) and ``mean``, not numbers where every
+    prediction diverged; how many ``diverged``.
+    """
 
     label: str
     quantiles: FloatArray
@@ -28,14 +30,16 @@ class Spread:
 
 
 def select(sources: Sequence[Source], settings: Plot) -> list[Spread]:
-    """What the figure shows. Raises ``InvalidValueError`` where every prediction of an evaluation diverged."""
-    found = []
-    for source in sources:
-        evaluation = source.records["evaluation"]
-        rmse = evaluation.rmse[any_error(evaluation.rmse, evaluation.diverged)]
-        diverged = int(evaluation.diverged.sum())
-        found.append(Spread(source.label, np.quantile(rmse, QUANTILES), float(rmse.mean()), diverged))
-    return found
+    """What the figure shows. Raises ``InvalidValueError`` where every prediction of all evaluations diverged."""
+    return [_spread(source, shown) for source, shown in zip(sources, with_error(sources), strict=True)]
+
+
+def _spread(source: Source, shown: BoolArray) -> Spread:
+    evaluation = source.records["evaluation"]
+    rmse, diverged = evaluation.rmse[shown], int(evaluation.diverged.sum())
+    if not len(rmse):
+        return Spread(source.label, np.full(len(QUANTILES), np.nan), np.nan, diverged)
+    return Spread(source.label, np.quantile(rmse, QUANTILES), float(rmse.mean()), diverged)
 
 
 def numbers(shown: Sequence[Spread]) -> Mapping[str, Array]:
@@ -53,8 +57,11 @@ def draw(shown: Sequence[Spread]) -> Figure:
     with style():
         figure = Figure(figsize=(COLUMN, 1.0 + 0.3 * len(shown)), layout="constrained")
         axes = figure.subplots()
+        first_drawn = next(row for row, one in enumerate(shown) if np.isfinite(one.mean))
         for row, one in enumerate(shown):
-            named = str if row == 0 else _nameless
+            if not np.isfinite(one.mean):
+                continue
+            named = str if row == first_drawn else _nameless
             low, first, median, third, high = one.quantiles
             axes.plot([low, high], [row, row], "-", color=COLOURS[0], linewidth=0.8, zorder=2, label=named("5 to 95 %"))
             axes.barh(row, third - first, left=first, height=0.5, color=COLOURS[5], zorder=3, label=named("quartiles"))
@@ -79,9 +86,11 @@ def draw(shown: Sequence[Spread]) -> Figure:
 
 
 def _nameless(label: str) -> None:
-    """No entry of the legend: the first row has it."""
+    """No entry of the legend: another row has it."""
 
 
 def _row(one: Spread) -> str:
+    if not np.isfinite(one.mean):
+        return f"{one.label}\nall diverged"
     lost = f", {one.diverged} diverged" if one.diverged else ""
     return f"{one.label}\nmean {one.mean:.3g} %{lost}"

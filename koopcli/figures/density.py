@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
 from koopcli.figures.colours import COLOURS, PAPER
-from koopcli.figures.drawing import Source, any_error, column
+from koopcli.figures.drawing import Source, column, with_error
 from koopcli.figures.style import COLUMN, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray
 
@@ -32,7 +32,7 @@ class Density:
 def select(sources: Sequence[Source], settings: Plot) -> Density:
     """What the figure shows. Raises ``InvalidValueError`` where every prediction diverged."""
     evaluation = sources[0].records["evaluation"]
-    shown = any_error(evaluation.rmse, evaluation.diverged)
+    (shown,) = with_error(sources)
     distance, rmse = evaluation.distance[shown], evaluation.rmse[shown]
     groups = np.array_split(np.argsort(distance, kind="stable"), min(GROUPS, len(rmse)))
     typical = np.array([[np.median(distance[group]), np.median(rmse[group])] for group in groups])

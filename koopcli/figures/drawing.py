@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any
@@ -13,6 +13,8 @@ import numpy.typing as npt
 from koopcli.config.settings import Plot, Series
 from koopcli.errors import InvalidValueError
 from koopcli.records import Array, BoolArray, Channels, FloatArray, Packed
+
+LOST = " (all diverged)"  # after the name of one among several that has no error to draw
 
 
 @dataclass(frozen=True)
@@ -82,9 +84,14 @@ def state_columns(x: FloatArray, channels: Channels, axis: str, name: str = "{}"
     return {name.format(state): column(x[:, i], axis, unit) for i, (state, unit) in enumerate(named)}
 
 
-def any_error(rmse: FloatArray, diverged: BoolArray) -> BoolArray:
-    """Which trajectories (n,) have an error to draw. Raises ``InvalidValueError`` where none has."""
-    shown = np.isfinite(rmse) & ~diverged
-    if not shown.any():
-        raise InvalidValueError("every prediction of this evaluation diverged: there is no error to draw")
-    return np.asarray(shown)
+def with_error(sources: Sequence[Source]) -> list[BoolArray]:
+    """Which trajectories (n,) of each drawn evaluation have an error: those that neither diverged nor are zero.
+
+    Raises ``InvalidValueError`` where none of any evaluation has.
+    """
+    evaluations = [source.records["evaluation"] for source in sources]
+    shown = [np.asarray(np.isfinite(one.rmse) & ~one.diverged) for one in evaluations]
+    if not any(one.any() for one in shown):
+        whose = "this evaluation" if len(sources) == 1 else "these evaluations"
+        raise InvalidValueError(f"every prediction of {whose} diverged: there is no error to draw")
+    return shown

@@ -22,7 +22,7 @@ PALEST = 0.2  # opacity of a ball without error
 
 def select(sources: Sequence[Source], settings: Plot) -> Balls:
     """What the figure shows. Raises ``InvalidValueError`` where every prediction diverged."""
-    return balls(sources[0].records["evaluation"])
+    return balls(sources[0])
 
 
 def numbers(shown: Balls) -> Mapping[str, Array]:

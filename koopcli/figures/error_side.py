@@ -30,10 +30,9 @@ class ErrorSide:
 
 def select(sources: Sequence[Source], settings: Plot) -> ErrorSide:
     """What the figure shows. Raises ``InvalidValueError`` where every prediction diverged."""
-    records = sources[0].records
-    training: Trajectories = records["training"]
+    training: Trajectories = sources[0].records["training"]
     each = -(-len(training) // PATHS)
-    return ErrorSide(balls(records["evaluation"]), np.asarray(training.x[::each]))
+    return ErrorSide(balls(sources[0]), np.asarray(training.x[::each]))
 
 
 def numbers(shown: ErrorSide) -> Mapping[str, Array]:

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
 from koopcli.figures.colours import COLOURS
-from koopcli.figures.drawing import Source, any_error, column
+from koopcli.figures.drawing import LOST, Source, column, with_error
 from koopcli.figures.style import COLUMN, looks, plain_numbers, style
-from koopcli.records import Array, FloatArray, Trajectories
+from koopcli.records import Array, BoolArray, FloatArray, Trajectories
 
 QUANTILES = {"lower": 0.1, "median": 0.5, "upper": 0.9}
 SHOWN_FROM = 1e-3  # %, of errors on a logarithmic axis; a start that is known is exact
@@ -34,19 +34,20 @@ class ErrorOverTime:
 
 
 def select(sources: Sequence[Source], settings: Plot) -> list[ErrorOverTime]:
-    """What the figure shows. Raises ``InvalidValueError`` where every prediction of an evaluation diverged."""
-    return [_over_time(source) for source in sources]
+    """What the figure shows. Raises ``InvalidValueError`` where every prediction of all evaluations diverged."""
+    return [_over_time(source, shown) for source, shown in zip(sources, with_error(sources), strict=True)]
 
 
-def _over_time(source: Source) -> ErrorOverTime:
+def _over_time(source: Source, shown: BoolArray) -> ErrorOverTime:
     evaluation, predictor, test = (source.records[role] for role in ("evaluation", "predictor", "trajectories"))
     assert isinstance(test, Trajectories)
-    shown = any_error(evaluation.rmse, evaluation.diverged)
+    time = test.dt * np.arange(test.steps + 1.0)
+    if not shown.any():
+        return ErrorOverTime(source.label + LOST, time, *np.full((3, len(time)), np.nan))
     x, u = np.asarray(test.x[:])[shown], np.asarray(test.u[:])[shown]
     error = np.linalg.norm(predictor.predict(x[:, 0], u) - x, axis=2)
     size = np.sqrt((x[:, evaluation.first :] ** 2).sum(axis=2).mean(axis=1))
     relative = 100 * error / size[:, np.newaxis]
-    time = test.dt * np.arange(test.steps + 1.0)
     statistics = {name: np.quantile(relative, q, axis=0) for name, q in QUANTILES.items()}
     return ErrorOverTime(source.label, time, **statistics)
 

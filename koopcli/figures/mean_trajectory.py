@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
 from koopcli.figures.colours import COLOURS
-from koopcli.figures.drawing import Source, any_error, column, state_columns
+from koopcli.figures.drawing import Source, column, state_columns, with_error
 from koopcli.figures.style import COLUMN, axis_label, style
 from koopcli.records import Array, Channels, FloatArray, Trajectories
 
@@ -32,7 +32,8 @@ def select(sources: Sequence[Source], settings: Plot) -> MeanTrajectory:
     records = sources[0].records
     evaluation, predictor, test = records["evaluation"], records["predictor"], records["trajectories"]
     assert isinstance(test, Trajectories)
-    rmse = np.where(any_error(evaluation.rmse, evaluation.diverged), evaluation.rmse, np.nan)
+    (shown,) = with_error(sources)
+    rmse = np.where(shown, evaluation.rmse, np.nan)
     mean = float(np.nanmean(rmse))
     j = int(np.nanargmin(np.abs(rmse - mean)))
     true = np.asarray(test.x[j : j + 1])

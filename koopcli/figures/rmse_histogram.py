@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from koopcli.config.settings import Plot
 from koopcli.figures.colours import COLOURS
-from koopcli.figures.drawing import Source, any_error, column
+from koopcli.figures.drawing import LOST, Source, column, with_error
 from koopcli.figures.style import COLUMN, looks, plain_numbers, style
 from koopcli.records import Array, FloatArray
 
@@ -32,17 +32,18 @@ class Histogram:
 def select(sources: Sequence[Source], settings: Plot) -> list[Histogram]:
     """What the figure shows, every evaluation in the same bins, even on a logarithmic axis.
 
-    Raises ``InvalidValueError`` where every prediction of an evaluation diverged.
+    Raises ``InvalidValueError`` where every prediction of all evaluations diverged.
     """
-    errors = []
-    for source in sources:
-        evaluation = source.records["evaluation"]
-        errors.append(evaluation.rmse[any_error(evaluation.rmse, evaluation.diverged)])
+    masks = with_error(sources)
+    errors = [source.records["evaluation"].rmse[shown] for source, shown in zip(sources, masks, strict=True)]
     every = np.concatenate(errors)
     low, high = np.quantile(every[every > 0] if (every > 0).any() else [1.0], [LOWEST, HIGHEST])
     edges = np.geomspace(low * (1 - 1e-9), max(high, low * 1.01) * (1 + 1e-9), BINS + 1)
     found = []
     for source, rmse in zip(sources, errors, strict=True):
+        if not len(rmse):
+            found.append(Histogram(source.label + LOST, edges, np.zeros(BINS), np.nan, np.nan))
+            continue
         counts = np.histogram(np.clip(rmse, edges[0], edges[-1]), edges)[0]
         share = 100 * counts / len(rmse)
         found.append(Histogram(source.label, edges, share, float(rmse.mean()), float(np.median(rmse))))
@@ -69,9 +70,8 @@ def draw(shown: Sequence[Histogram]) -> Figure:
                 axes.axvline(one.mean, color=COLOURS[0], label=f"mean {one.mean:.4g} %")
                 axes.axvline(one.median, color=COLOURS[1], linestyle="--", label=f"median {one.median:.4g} %")
             else:
-                axes.stairs(
-                    one.share, one.edges, label=f"{one.label} (median {one.median:.3g} %)", linewidth=1.2, **look
-                )
+                median = f" (median {one.median:.3g} %)" if np.isfinite(one.median) else ""
+                axes.stairs(one.share, one.edges, label=one.label + median, linewidth=1.2, **look)
         axes.set_xscale("log")
         plain_numbers(axes.xaxis)
         axes.set_xlabel("RMSE (%)")

@@ -78,12 +78,12 @@ def command(run: Run, picture: Picture, draws: Sequence[Record]) -> str:
         alone = drawn.figure(name, made.tasks(run.experiment), task.settings.format, run.experiment)
     except (UsageError, InvalidValueError):  # changes that hold for this method's samples and not for the figure's
         alone = None
-    if alone == task:
-        words += [] if run.base == "paper" else ["--experiment", run.base]
-        told = list(run.changes)
-    else:
+    told = list(run.changes)
+    if alone != task:
         words += [record.name for record in draws]
-        told = [one for one in run.changes if kind.takes == "predictor" and one.startswith(drawn.TOLD_BESIDE)]
+        told = [one for one in told if kind.takes == "predictor" and one.startswith(drawn.TOLD_BESIDE)]
+    if run.base != "paper" and (alone == task or kind.takes == "predictor"):
+        words += ["--experiment", run.base]
     reads = (*made.reads, *(f"plot.{field}" for field in kind.told))
     for one in told:
         ((setting, _),) = flat(parse_set([one]))

@@ -145,6 +145,23 @@ def test_single_lost_trajectories_are_left_out(name):
     assert all(np.isfinite(array.values).all() for array in numbers.values())
 
 
+@pytest.mark.parametrize("name", [name for name, kind in FIGURES.items() if kind.draws == "beside"])
+def test_one_lost_among_several_is_named_and_costs_the_others_nothing(name):
+    records = figure_records(name)
+    whole = records["1/evaluation"]
+    lost = {**records, "0/evaluation": replace(whole, diverged=np.ones(len(whole.rmse), dtype=bool))}
+    settings = figure_settings(name)
+    module = import_module(f"koopcli.figures.{name.replace('-', '_')}")
+    (first, second), (_, alone) = (module.select(sources_of(settings, inputs), settings) for inputs in (lost, records))
+    for field in vars(alone).keys() - {"edges", "share"}:  # bins are those of all that is drawn
+        assert np.array_equal(getattr(second, field), getattr(alone, field)), field
+    figure = module.draw([first, second])
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    said = [text.get_text() for text in _labels(figure)] + [t.get_text() for t in figure.axes[0].get_yticklabels()]
+    assert sum("all diverged" in text for text in said) == 1
+
+
 def test_nothing_global_is_left_behind():
     before = dict(mpl.rcParams)
     for name in FIGURES:
