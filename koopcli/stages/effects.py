@@ -35,11 +35,12 @@ def _of_nothing(tasks: Sequence[Task]) -> str:
 
 
 def _idle_sample(section: str, key: str, tasks: Sequence[Task], behind: Sequence[Task]) -> str | None:
-    """Of a setting of samples, of one kind or of the kind in use."""
-    tested = _test_samples(behind)
+    """Of a setting of samples, of one kind or of the kind in use, which only evaluations have."""
+    tested = _test_samples(behind, ("evaluate", "plot"))
     relevant = tested if section == "test" else _samples(behind) - tested or tested
     if "." not in key:
-        return _of_nothing(tasks) if tasks and not relevant else None
+        in_use = _test_samples(behind, ("evaluate",)) if section == "test" else relevant
+        return _of_nothing(tasks) if tasks and not in_use else None
     kind = key.partition(".")[0]
     return None if kind in {one.settings.kind for one in relevant} else f"no {section} of kind '{kind}' is used"
 
@@ -75,12 +76,12 @@ def _samples(behind: Sequence[Task]) -> set[Task]:
     return {step for step in behind if step.stage == "sample"}
 
 
-def _test_samples(behind: Sequence[Task]) -> set[Task]:
-    """The samples that evaluations and figures among ``behind`` test on."""
+def _test_samples(behind: Sequence[Task], stages: Sequence[str]) -> set[Task]:
+    """The samples that steps of ``stages`` among ``behind`` test on."""
     tests = [
         task
         for step in behind
-        if step.stage in ("evaluate", "plot")
+        if step.stage in stages
         for role, task in step.inputs
         if role.rpartition("/")[2] == "trajectories"
     ]

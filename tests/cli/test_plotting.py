@@ -116,6 +116,8 @@ def test_one_changed_assumption(koop):
         ("compare", "baseline.kind=hold", "fixed baselines"),
         ("spectrum", "test.box.seed=2", "no test of kind 'box'"),
         ("spectrum", "test.seed=2", "draws nothing of it"),
+        ("random-input", "test.seed=2", "draws nothing of it"),  # it is of its own kind, whichever is in use
+        ("random-input", "test.box.seed=2", "no test of kind 'box' is used"),
         ("orders", "reproduce.seeds=[1]", "draws nothing of it"),
     ],
 )
@@ -190,4 +192,5 @@ def test_where_an_image_cannot_be_written(koop, folder):
         one_line(koop("plot", "tyre", option, f"no/such/folder/x{ending}"), 6, "no/such/folder")
         one_line(koop("plot", "tyre", "-o", "taken"), 3, "unknown ending")
     one_line(koop("plot", "tyre", "--csv", "taken"), 6, "name a file")
+    one_line(koop("plot", "tyre", "-o", "x.png", "--csv", "x.png"), 2, "x.png cannot be both")
     assert not (folder / "artefacts").exists()
