@@ -54,7 +54,7 @@ def plot(
     if figure not in get_args(FigureName):
         raise UnknownNameError(f"unknown figure '{figure}'{candidates(figure, get_args(FigureName))}")
     image = _format(output)
-    if output is not None and output == csv_:
+    if output is not None and csv_ is not None and output.resolve() == csv_.resolve():
         raise UsageError(f"{output} cannot be both the image and its numbers: name two files")
     for path in (output, csv_):
         if path is not None and (path.is_dir() or not os.access(path.parent, os.W_OK)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from textwrap import fill
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,6 +15,7 @@ from koopcli.figures.drawing import Source, column, with_error
 from koopcli.figures.style import COLUMN, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray
 
+WIDEST = 34  # letters of a name in a line
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
@@ -75,7 +77,9 @@ def draw(shown: Sequence[Spread]) -> Figure:
                 label=named("median"),
             )
             axes.plot(one.mean, row, "D", color=COLOURS[1], markersize=4, zorder=5, label=named("mean"))
+        axes.use_sticky_edges = False
         axes.set_xscale("log")
+        axes.margins(x=0.06)
         plain_numbers(axes.xaxis)
         axes.set_ylim(len(shown) - 0.5, -0.5)
         axes.set_yticks(range(len(shown)), [_row(one) for one in shown])
@@ -90,7 +94,8 @@ def _nameless(label: str) -> None:
 
 
 def _row(one: Spread) -> str:
+    name = fill(one.label, WIDEST)
     if not np.isfinite(one.mean):
-        return f"{one.label}\nall diverged"
+        return f"{name}\nall diverged"
     lost = f", {one.diverged} diverged" if one.diverged else ""
-    return f"{one.label}\nmean {one.mean:.3g} %{lost}"
+    return f"{name}\nmean {one.mean:.3g} %{lost}"

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from koopcli.config.settings import Plot
 from koopcli.figures.colours import COLOURS, PAPER
 from koopcli.figures.drawing import Source, column, with_error
-from koopcli.figures.style import COLUMN, plain_numbers, style
+from koopcli.figures.style import COLUMN, legend_below, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray
 
 GROUPS = 20  # of equally many trajectories, by distance
@@ -56,8 +56,8 @@ def draw(shown: Density) -> Figure:
         figure = Figure(figsize=(COLUMN, 2.7), layout="constrained")
         axes = figure.subplots()
         for which, colour, marker, size, label in (
-            (~shown.outside, COLOURS[5], "o", 2, "x0 inside the hull of the data"),
-            (shown.outside, COLOURS[1], "^", 3, "x0 outside"),
+            (~shown.outside, COLOURS[5], "o", 2, "$x_0$ inside the hull of the data"),
+            (shown.outside, COLOURS[1], "^", 3, "$x_0$ outside"),
         ):
             if which.any():
                 axes.plot(
@@ -73,7 +73,7 @@ def draw(shown: Density) -> Figure:
         axes.plot(*shown.typical.T, "-", color=PAPER, label="median by distance")
         axes.set_yscale("log")
         plain_numbers(axes.yaxis)
-        axes.set_xlabel("distance of x0 to the data (half-widths of its box)")
+        axes.set_xlabel("distance of $x_0$ to the data (half-widths of its box)")
         axes.set_ylabel("RMSE (%)")
-        figure.legend(loc="outside lower center", ncols=2, markerscale=2)
+        legend_below(figure, markerscale=2)
     return figure

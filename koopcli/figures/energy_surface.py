@@ -17,6 +17,7 @@ from koopcli.figures.style import COLUMN, axis_label, in_space, style
 from koopcli.records import Array, Channels, FloatArray, Sample
 from koopcli.simulation.sampling import sphere_mesh
 
+FINEST = 20  # faces from pole to pole at least, a multiple of the states' own
 OFF_SURFACE = 1e-6  # relative, of states that are taken to lie on one surface
 
 
@@ -52,9 +53,10 @@ def numbers(shown: EnergySurface) -> Mapping[str, Array]:
 
 
 def draw(shown: EnergySurface) -> Figure:
-    """The surface as a mesh of about as many vertices as there are states; those behind it are paler."""
+    """The surface as a mesh that has the vertices of a mesh of states; those behind it are paler."""
     names = [axis_label(n, u) for n, u in zip(shown.channels.names, shown.channels.units, strict=True)]
-    n = max(5, round(math.sqrt(len(shown.x0))))
+    between = max(4, round(math.sqrt(len(shown.x0))) - 1)
+    n = between * math.ceil(FINEST / between) + 1
     X, Y, Z = (sphere_mesh(n * n) * shown.semi_axes).reshape(n, n, 3).transpose(2, 0, 1)
     with style():
         figure = Figure(figsize=(COLUMN, 3.2), layout="constrained")
@@ -62,8 +64,8 @@ def draw(shown: EnergySurface) -> Figure:
         in_space(axes, names, zoom=0.95)
         towards = _towards(axes.elev, axes.azim) / shown.semi_axes
         front = shown.x0 @ towards > 0
-        axes.scatter(*shown.x0[~front].T, s=4, color=COLOURS[5], alpha=0.45, linewidths=0, depthshade=False, zorder=1)
-        axes.plot_surface(X, Y, Z, color="white", alpha=0.6, shade=False, edgecolor=GUIDE, linewidth=0.25, zorder=2)
+        axes.scatter(*shown.x0[~front].T, s=4, color=COLOURS[5], alpha=0.9, linewidths=0, depthshade=False, zorder=1)
+        axes.plot_surface(X, Y, Z, color="white", alpha=0.5, shade=False, edgecolor=GUIDE, linewidth=0.25, zorder=2)
         axes.scatter(*shown.x0[front].T, s=6, color=COLOURS[0], linewidths=0, depthshade=False, zorder=3)
     return figure
 

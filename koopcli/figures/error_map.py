@@ -45,6 +45,8 @@ def draw(shown: Balls) -> Figure:
         above.scatter(
             shown.x0[:, 0], shown.x0[:, 1], s=shown.sizes, color=colours, linewidths=0, zorder=3, rasterized=True
         )
+        if len(set(shown.channels.units[:2])) == 1:
+            above.set_aspect("equal", adjustable="datalim")
         above.set_xlabel(names[0])
         above.set_ylabel(names[1])
         bar: dict[str, Any] = {

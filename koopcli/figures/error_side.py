@@ -13,16 +13,17 @@ from koopcli.config.settings import Plot
 from koopcli.figures.balls import Balls, balls, columns
 from koopcli.figures.colours import SHADES, TRAINING
 from koopcli.figures.drawing import Source, column, state_columns
-from koopcli.figures.style import COLUMN, axis_label, style
+from koopcli.figures.style import COLUMN, axis_label, legend_below, style
+from koopcli.koopman.coverage import spread
 from koopcli.records import Array, FloatArray, Trajectories
 
-PATHS = 500  # training trajectories drawn at most
+PATHS, STARTS = 500, 20_000  # training trajectories, or states of single steps, drawn at most
 SIDE = [1, 2]  # the states of the plane
 
 
 @dataclass(frozen=True)
 class ErrorSide:
-    """The ``balls`` and the training ``paths`` (J, samples, n_x)."""
+    """The ``balls`` and the training ``paths`` (J, samples, n_x), of single steps only the states they start from."""
 
     balls: Balls
     paths: FloatArray
@@ -31,6 +32,9 @@ class ErrorSide:
 def select(sources: Sequence[Source], settings: Plot) -> ErrorSide:
     """What the figure shows. Raises ``InvalidValueError`` where every prediction diverged."""
     training: Trajectories = sources[0].records["training"]
+    if training.steps == 1:  # too short to see: every state that is stepped from, once
+        starts = np.unique(np.asarray(training.x[:, 0]), axis=0)
+        return ErrorSide(balls(sources[0]), starts[spread(len(starts), STARTS), np.newaxis])
     each = -(-len(training) // PATHS)
     return ErrorSide(balls(sources[0]), np.asarray(training.x[::each]))
 
@@ -50,11 +54,13 @@ def draw(shown: ErrorSide) -> Figure:
     with style():
         figure = Figure(figsize=(COLUMN, 2.9), layout="constrained")
         axes = figure.subplots()
-        if shown.paths.shape[1] > 2:
+        if shown.paths.shape[1] > 1:
             lines = list(shown.paths[:, :, SIDE])
-            axes.add_collection(LineCollection(lines, colors=TRAINING, linewidths=0.3, rasterized=True))
-        else:  # single steps are too short to see
-            axes.plot(shown.paths[:, 0, i], shown.paths[:, 0, j], "s", color=TRAINING, markersize=3, zorder=1)
+            name = "training trajectories"
+            axes.add_collection(LineCollection(lines, colors=TRAINING, linewidths=0.3, rasterized=True, label=name))
+        else:
+            there = np.unique(shown.paths[:, 0, SIDE], axis=0)
+            axes.plot(*there.T, "s", color=TRAINING, markersize=4, zorder=1, label="training states")
         balls = axes.scatter(
             seen.x0[:, i],
             seen.x0[:, j],
@@ -70,5 +76,6 @@ def draw(shown: ErrorSide) -> Figure:
         axes.set_xlabel(axis_label(channels.names[i], channels.units[i]))
         axes.set_ylabel(axis_label(channels.names[j], channels.units[j]))
         axes.autoscale_view()
+        legend_below(figure)
         figure.colorbar(balls, ax=axes, label="RMSE (%)", extend=seen.beyond)
     return figure

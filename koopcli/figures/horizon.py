@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from koopcli.config.settings import Plot
 from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import LOST, Source, column, with_error
-from koopcli.figures.style import COLUMN, looks, plain_numbers, style
+from koopcli.figures.style import COLUMN, legend_below, looks, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray, Trajectories
 
 QUANTILES = {"lower": 0.1, "median": 0.5, "upper": 0.9}
@@ -64,7 +64,7 @@ def numbers(shown: Sequence[ErrorOverTime]) -> Mapping[str, Array]:
 def draw(shown: Sequence[ErrorOverTime]) -> Figure:
     """Median and the band that holds eight of ten trajectories of one evaluation; medians of several."""
     with style():
-        figure = Figure(figsize=(COLUMN, 2.5 + 0.07 * len(shown)), layout="constrained")
+        figure = Figure(figsize=(COLUMN, 2.6), layout="constrained")
         axes = figure.subplots()
         for one, look in zip(shown, looks(len(shown)), strict=True):
             if len(shown) == 1:
@@ -77,13 +77,15 @@ def draw(shown: Sequence[ErrorOverTime]) -> Figure:
                     linewidth=0,
                     label="10 to 90 % of trajectories",
                 )
-            axes.plot(one.time, _seen(one.median), label=one.label or "median", **look)
+            median = _seen(one.median)
+            alone = np.isfinite(median).sum() == 1  # a line of one point is none
+            axes.plot(one.time, median, marker="o" if alone else "", label=one.label or "median", **look)
         axes.set_yscale("log")
         plain_numbers(axes.yaxis)
         axes.set_xlabel("time (s)")
-        axes.set_ylabel("error (% of the trajectory's size)" if len(shown) == 1 else "median error (%)")
+        axes.set_ylabel("error (% of the trajectory's size)" if len(shown) == 1 else "median error (% of the size)")
         axes.set_xlim(shown[0].time[0], shown[0].time[-1])
-        figure.legend(loc="outside lower center", ncols=2)
+        legend_below(figure)
     return figure
 
 

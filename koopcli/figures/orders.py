@@ -16,7 +16,7 @@ from koopcli.config.settings import Plot
 from koopcli.errors import InvalidValueError
 from koopcli.figures.colours import COLOURS, MARKERS, PAPER
 from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, plain_numbers, style
+from koopcli.figures.style import COLUMN, legend_below, plain_numbers, style
 from koopcli.records import Array, FloatArray
 
 
@@ -81,5 +81,5 @@ def draw(curves: Sequence[OrderErrors]) -> Figure:
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_xlabel("order of the polynomial basis")
         axes.set_ylabel("RMSE (%)")
-        figure.legend(loc="outside lower center", ncols=2, title=curves[0].label if len(curves) == 1 else None)
+        legend_below(figure, title=curves[0].label if len(curves) == 1 else None)
     return figure

@@ -17,6 +17,8 @@ from koopcli.koopman.metrics import rmse
 from koopcli.koopman.restarts import restarted
 from koopcli.records import Array, Channels, FloatArray, Trajectories
 
+MARKED = 15  # restarts that are marked by lines; more would hide what is drawn
+
 
 @dataclass(frozen=True)
 class RandomInput:
@@ -70,24 +72,26 @@ def numbers(shown: RandomInput) -> Mapping[str, Array]:
 
 def draw(shown: RandomInput) -> Figure:
     """One panel for each state; a line marks every restart."""
-    n_x = len(shown.channels)
+    n_x, few = len(shown.channels), len(shown.starts) <= MARKED
     with style():
         figure = Figure(figsize=(COLUMN, 1.15 * n_x + 0.7), layout="constrained")
         panels = figure.subplots(n_x, sharex=True)
         for i, axes in enumerate(panels):
-            for k in shown.starts[1:]:
+            for k in shown.starts[1:] if few else ():
                 axes.axvline(shown.time[k], color=GUIDE, linewidth=0.6, linestyle=(0, (1, 2)), zorder=1)
             axes.plot(shown.time, shown.true[:, i], "-", color=COLOURS[0], label="true")
             for k, segment in zip(shown.starts, shown.predicted, strict=True):
                 label = "predicted, started afresh at each dot" if k == 0 else None
                 axes.plot(shown.time[k : k + len(segment)], segment[:, i], "--", color=COLOURS[1], label=label)
-                axes.plot(shown.time[k], segment[0, i], "o", color=COLOURS[1], markersize=3)
+                axes.plot(shown.time[k], segment[0, i], "o", color=COLOURS[1], markersize=3 if few else 1)
             axes.set_ylabel(axis_label(shown.channels.names[i], shown.channels.units[i]))
             axes.grid(visible=False, axis="x")
         panels[-1].set_xlabel("time (s)")
         figure.align_ylabels()
         handles, labels = panels[0].get_legend_handles_labels()
-        smallest, largest = shown.rmse.min(), shown.rmse.max()
-        title = f"RMSE of a segment {smallest:.3g} … {largest:.3g} % (mean {shown.rmse.mean():.3g} %)"
+        title = f"RMSE {shown.rmse[0]:.3g} %"
+        if len(shown.rmse) > 1:
+            smallest, largest = shown.rmse.min(), shown.rmse.max()
+            title = f"RMSE of a segment {smallest:.3g} … {largest:.3g} % (mean {shown.rmse.mean():.3g} %)"
         figure.legend(handles, labels, loc="outside lower center", ncols=2, title=title)
     return figure

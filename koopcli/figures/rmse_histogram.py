@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from koopcli.config.settings import Plot
 from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import LOST, Source, column, with_error
-from koopcli.figures.style import COLUMN, looks, plain_numbers, style
+from koopcli.figures.style import COLUMN, legend_below, looks, plain_numbers, style
 from koopcli.records import Array, FloatArray
 
 BINS = 40
-LOWEST, HIGHEST = 0.002, 0.998  # quantiles between which the bins lie; what is beyond falls into the outermost
+NARROWEST = 1.5  # ratio of the largest and the smallest RMSE of the bins
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,9 @@ def select(sources: Sequence[Source], settings: Plot) -> list[Histogram]:
     masks = with_error(sources)
     errors = [source.records["evaluation"].rmse[shown] for source, shown in zip(sources, masks, strict=True)]
     every = np.concatenate(errors)
-    low, high = np.quantile(every[every > 0] if (every > 0).any() else [1.0], [LOWEST, HIGHEST])
-    edges = np.geomspace(low * (1 - 1e-9), max(high, low * 1.01) * (1 + 1e-9), BINS + 1)
+    some = every[every > 0] if (every > 0).any() else np.ones(1)
+    low, high = some.min(), max(some.max(), some.min() * NARROWEST)
+    edges = np.geomspace(low * (1 - 1e-9), high * (1 + 1e-9), BINS + 1)
     found = []
     for source, rmse in zip(sources, errors, strict=True):
         if not len(rmse):
@@ -62,7 +63,7 @@ def numbers(shown: Sequence[Histogram]) -> Mapping[str, Array]:
 def draw(shown: Sequence[Histogram]) -> Figure:
     """Bars with mean and median of one evaluation; outlines of several."""
     with style():
-        figure = Figure(figsize=(COLUMN, 2.4 + 0.13 * len(shown)), layout="constrained")
+        figure = Figure(figsize=(COLUMN, 2.5), layout="constrained")
         axes = figure.subplots()
         for one, look in zip(shown, looks(len(shown)), strict=True):
             if len(shown) == 1:
@@ -76,5 +77,5 @@ def draw(shown: Sequence[Histogram]) -> Figure:
         plain_numbers(axes.xaxis)
         axes.set_xlabel("RMSE (%)")
         axes.set_ylabel("share of trajectories (%)")
-        figure.legend(loc="outside lower center", ncols=2 if len(shown) == 1 else 1)
+        legend_below(figure)
     return figure

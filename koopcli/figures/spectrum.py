@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from koopcli.config.settings import Plot
 from koopcli.figures.colours import COLOURS, GUIDE
 from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, style
+from koopcli.figures.style import COLUMN, legend_below, style
 from koopcli.koopman.modes import ComplexArray, Modes
 from koopcli.koopman.predictor import Predictor
 from koopcli.records import Array
@@ -88,7 +88,7 @@ def draw(shown: Spectrum) -> Figure:
             axes.set_ylabel(f"imaginary part ({unit})")
             axes.set_box_aspect(TALL)
         title = f"each {shown.copies} times" if shown.copies > 1 else None
-        figure.legend(loc="outside lower center", ncols=2, title=title)
+        legend_below(figure, title)
     return figure
 
 

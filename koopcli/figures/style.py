@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from textwrap import fill
 from typing import Any
 
 import matplotlib as mpl
@@ -17,6 +18,7 @@ from koopcli.figures.colours import COLOURS, DASHES
 
 COLUMN = 3.5  # inches, one column of a two-column page
 
+WIDEST, HANDLE, LINE = 62, 10, 0.13  # letters of a legend in one column, of a line before its name; inches of a row
 NARROW = 200  # ratio of the ends of a logarithmic axis below which 2 and 5 are written too
 
 STYLE = {
@@ -29,6 +31,7 @@ STYLE = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
+    "axes.axisbelow": True,
     "grid.color": "#dddddd",
     "grid.linewidth": 0.5,
     "lines.linewidth": 1.2,
@@ -41,10 +44,27 @@ STYLE = {
 
 
 def looks(count: int) -> list[dict[str, Any]]:
-    """Colour and dashes of each of ``count`` lines, all different up to three times the colours."""
+    """Colour and dashes of each of ``count`` lines, all different up to three times the colours.
+
+    Dashes change from line to line, so that one that lies over another lets it through.
+    """
     return [
-        {"color": COLOURS[i % len(COLOURS)], "linestyle": DASHES[i // len(COLOURS) % len(DASHES)]} for i in range(count)
+        {"color": COLOURS[i % len(COLOURS)], "linestyle": DASHES[(i + i // len(COLOURS)) % len(DASHES)]}
+        for i in range(count)
     ]
+
+
+def legend_below(figure: Figure, title: str | None = None, columns: int = 2, **look: float) -> None:
+    """The legend under the panels, in as many ``columns`` as its words leave room for, and room for its rows."""
+    found = [axes.get_legend_handles_labels() for axes in figure.axes]
+    handles = [handle for some, _ in found for handle in some]
+    labels = [fill(label, WIDEST) for _, names in found for label in names]
+    longest = max(len(line) for label in labels for line in label.splitlines())
+    if columns * (longest + HANDLE) > WIDEST + HANDLE:
+        columns = 1
+    rows = sum(label.count("\n") + 1 for label in labels) / columns
+    figure.set_figheight(figure.get_figheight() + LINE * max(0.0, rows - 2))
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, title=title, **look)
 
 
 def plain_numbers(axis: Axis) -> None:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from koopcli.config.settings import Plot, Tyres
 from koopcli.figures.colours import GUIDE
 from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, looks, style
+from koopcli.figures.style import COLUMN, legend_below, looks, style
 from koopcli.records import Array, FloatArray
 from koopcli.vehicles.tyre import force
 
@@ -78,5 +78,5 @@ def draw(curves: Sequence[TyreCurve]) -> Figure:
         side.set_ylabel("force of one wheel (kN)")
         side.set_title("lateral", fontsize=8)
         along.set_title("longitudinal", fontsize=8)
-        figure.legend(loc="outside lower center", ncols=2)
+        legend_below(figure)
     return figure

@@ -8,7 +8,7 @@ from typing import Any
 
 from koopcli.checks import build
 from koopcli.config.experiment import Experiment, flat
-from koopcli.config.samples import INPUTS, BoxSample, PointSample
+from koopcli.config.samples import INPUTS, SAMPLED_FOR, BoxSample, PointSample
 from koopcli.config.settings import ImageFormat, Plot, Series, Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError
 from koopcli.figures import source_digest
@@ -16,6 +16,7 @@ from koopcli.figures.registry import FIGURES, FigureKind
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 from koopcli.stages.makers import LIFTED, MAKERS, prospect
+from koopcli.vehicles.plants import PLANTS
 
 TAKES: dict[str, tuple[str, ...]] = {
     "evaluation": ("evaluate",),
@@ -45,7 +46,7 @@ MADE: dict[str, Made] = {
     "orders": Made(
         recipes.order_sweep,
         reads=("reproduce.orders",),
-        fixed=("fit-edmd.order", "reproduce.draws", "reproduce.excitations"),
+        fixed=("fit-edmd.order", "fit-edmd.basis", "reproduce.draws", "reproduce.excitations"),
         instead="it sweeps reproduce.orders with sample.draw and test.excitation",
     ),
     "eigen": Made(lambda experiment: [recipes.evaluation(experiment, recipes.fit_eigen(experiment))]),
@@ -85,6 +86,9 @@ def figure(
     """
     kind = FIGURES[name]
     _check(name, kind, artefacts)
+    if kind.takes == "predictor":
+        for task in artefacts:
+            _check_plant(name, task, simulated(task).plant)
     inputs = tuple(
         (f"{i}/{role}", _behind(task, role, experiment, simulated))
         for i, task in enumerate(artefacts)
@@ -109,9 +113,24 @@ def _check(name: str, kind: FigureKind, artefacts: Sequence[Task]) -> None:
             _check_shared(name, artefacts[0], other)
 
 
+def _check_plant(name: str, predictor: Task, plant: str | None) -> None:
+    """Refuse a predictor of a plant that the trajectory made for the figure cannot drive."""
+    meant = SAMPLED_FOR["point"]
+    assert plant is not None, "settled when it was simulated"
+    if PLANTS[plant].inputs != PLANTS[meant].inputs:
+        raise InvalidValueError(
+            f"the figure '{name}' takes predictors of the plant '{meant}', {predictor.name} is of '{plant}'"
+        )
+
+
 def _check_shared(name: str, one: Task, other: Task) -> None:
     """Refuse two evaluations that did not score the same samples of the same trajectories."""
     here, there = one.input("trajectories"), other.input("trajectories")
+    if here.settings.plant != there.settings.plant:
+        raise InvalidValueError(
+            f"{one.name} is of the plant '{here.settings.plant}', {other.name} of '{there.settings.plant}': the figure "
+            f"'{name}' draws predictors of one plant, on one test set"
+        )
     if here != there:
         raise InvalidValueError(
             f"the figure '{name}' draws predictors on one test set, but {one.name} is of {here.name} and {other.name} "
@@ -137,6 +156,9 @@ def _series(name: str, kind: FigureKind, artefacts: Sequence[Task]) -> tuple[Ser
     """What each of several artefacts is called; nothing where the figure draws one."""
     if kind.draws == "one":
         return ()
+    for task in artefacts:
+        if list(artefacts).count(task) > 1:
+            raise InvalidValueError(f"{task.name} is named twice: name each evaluation once")
     if kind.draws == "points":
         series = tuple(_point(name, task) for task in artefacts)
     else:

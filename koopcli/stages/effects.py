@@ -25,7 +25,7 @@ def why_idle(name: str, experiment: Experiment, tasks: Sequence[Task], reads: Se
     if tasks and section != "vehicle" and section not in stages - {"plot"}:  # a figure reads what it is told of
         return _of_nothing(tasks)
     if section in ("vehicle", "simulate"):
-        return _idle_in_plants(name, key, behind)
+        return _idle_in_plants(name, key, tasks, behind)
     return _idle_in_fit(section, key, experiment)
 
 
@@ -45,7 +45,7 @@ def _idle_sample(section: str, key: str, tasks: Sequence[Task], behind: Sequence
     return None if kind in {one.settings.kind for one in relevant} else f"no {section} of kind '{kind}' is used"
 
 
-def _idle_in_plants(name: str, key: str, behind: Sequence[Task]) -> str | None:
+def _idle_in_plants(name: str, key: str, tasks: Sequence[Task], behind: Sequence[Task]) -> str | None:
     """Of a setting of the vehicle or of its simulation."""
     plants = {step.settings.plant for step in behind if step.stage == "simulate"}
     by_energy = any(
@@ -54,6 +54,8 @@ def _idle_in_plants(name: str, key: str, behind: Sequence[Task]) -> str | None:
         if step.stage == "sample"
     )
     if not plants and not by_energy:
+        if tasks and tasks[0].stage == "plot":
+            return _of_nothing(tasks)
         return "only kinds of sample by kinetic energy depend on the vehicle, through its m and Jzz"
     unused = [plant for plant in plants if any(f"{name}.".startswith(f"{one}.") for one in UNUSED[plant])]
     return f"the plant '{unused[0]}' has no use for it" if plants and len(unused) == len(plants) else None

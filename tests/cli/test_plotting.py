@@ -105,7 +105,9 @@ def test_one_changed_assumption(koop):
 @pytest.mark.parametrize(
     ("name", "change", "part"),
     [
-        ("tyre", "vehicle.Jzz=1731", "only kinds of sample by kinetic energy"),
+        ("tyre", "vehicle.Jzz=1731", "the figure 'tyre' draws nothing of it"),
+        ("single-track", "vehicle.Jzz=1731", "the figure 'single-track' draws nothing of it"),
+        ("orders", "fit-edmd.basis=states", "it sweeps reproduce.orders"),
         ("tyre", "fit-edmd.order=3", "the figure 'tyre' draws nothing of it"),
         ("tyre", "sample.seed=3", "the figure 'tyre' draws nothing of it"),
         ("single-track", "vehicle.mu_scale=0.5", "changes nothing"),
@@ -146,7 +148,9 @@ def test_predictors_that_do_not_share_a_test_set(koop):
         one_line(result, 3, "on one test set", one, other, "evaluate each predictor with --on simulate/")
     from_start = koop("evaluate", predictor, "--set", "evaluate.first=0").name
     one_line(koop("plot", "compare", one, from_start), 3, "from k = 0", "evaluate.first")
-    one_line(koop("plot", "compare", one, one), 3, "name each once")
+    one_line(koop("plot", "compare", one, one), 3, f"{one} is named twice")
+    sliding = koop("evaluate", koop("fit-eigen").name).name
+    one_line(koop("plot", "compare", one, sliding), 3, "is of the plant 'forces'", "predictors of one plant")
 
 
 def test_predictors_of_one_name_are_told_apart_by_their_settings(koop, folder):
@@ -159,7 +163,9 @@ def test_predictors_of_one_name_are_told_apart_by_their_settings(koop, folder):
 
 
 def test_the_random_input_figure_is_of_plants_driven_by_forces(koop):
-    one_line(koop("plot", "random-input", koop("fit-eigen").name), 3, "inputs of the plant 'forces', not of 'slips'")
+    one_line(
+        koop("plot", "random-input", koop("fit-eigen").name), 3, "takes predictors of the plant 'forces', fit-eigen/"
+    )
     predictor = koop("fit-edmd").name
     told = koop("plot", "random-input", predictor, "--set", "plot.restart=3", "--set", "test.point.seed=4")
     assert told.code == 0
@@ -192,5 +198,5 @@ def test_where_an_image_cannot_be_written(koop, folder):
         one_line(koop("plot", "tyre", option, f"no/such/folder/x{ending}"), 6, "no/such/folder")
         one_line(koop("plot", "tyre", "-o", "taken"), 3, "unknown ending")
     one_line(koop("plot", "tyre", "--csv", "taken"), 6, "name a file")
-    one_line(koop("plot", "tyre", "-o", "x.png", "--csv", "x.png"), 2, "x.png cannot be both")
+    one_line(koop("plot", "tyre", "-o", "x.png", "--csv", "./x.png"), 2, "x.png cannot be both")
     assert not (folder / "artefacts").exists()
