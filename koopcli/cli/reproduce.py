@@ -144,8 +144,10 @@ def _finish(call: Invocation, name: str, parts: Sequence[_Part], *, as_json: boo
 
 
 def _identity(parts: Sequence[_Part]) -> str:
-    names = "\n".join(scored.record.name for part in parts for run in part.runs for scored in run.scored)
-    return hashlib.sha256(names.encode()).hexdigest()[:12]
+    """What tells a report from others: the artefacts it shows."""
+    names = [scored.record.name for part in parts for run in part.runs for scored in run.scored]
+    names += [one.record.name for part in parts for one in part.illustrations if one.record is not None]
+    return hashlib.sha256("\n".join(names).encode()).hexdigest()[:12]
 
 
 def _write_report(call: Invocation, name: str, parts: Sequence[_Part]) -> Path:

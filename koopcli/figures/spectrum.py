@@ -40,7 +40,7 @@ def select(sources: Sequence[Source], settings: Plot) -> Spectrum:
     eigenvalues = np.linalg.eigvals(predictor.A).astype(complex)
     eigenvalues = eigenvalues[np.lexsort([eigenvalues.imag, eigenvalues.real])]
     with np.errstate(divide="ignore"):
-        rates = np.log(eigenvalues) / predictor.dt
+        rates = np.log(np.abs(eigenvalues)) / predictor.dt + 1j * (np.angle(eigenvalues) / predictor.dt)
     return Spectrum(eigenvalues, rates, 1)
 
 

@@ -54,6 +54,12 @@ def looks(count: int) -> list[dict[str, Any]]:
     ]
 
 
+def plain(text: str) -> str:
+    """A user's text as it stands: neither mathematics nor, with a line in front, something to leave out of legends."""
+    shown = text.replace("$", r"\$")
+    return f"\u200b{shown}" if shown.startswith("_") else shown
+
+
 def legend_below(figure: Figure, title: str | None = None, columns: int = 2, **look: float) -> None:
     """The legend under the panels, in as many ``columns`` as its words leave room for, and room for its rows."""
     found = [axes.get_legend_handles_labels() for axes in figure.axes]

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from koopcli.config.settings import Plot, Tyres
 from koopcli.figures.colours import GUIDE
 from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, legend_below, looks, style
+from koopcli.figures.style import COLUMN, legend_below, looks, plain, style
 from koopcli.records import Array, FloatArray
 from koopcli.vehicles.tyre import force
 
@@ -68,7 +68,7 @@ def draw(curves: Sequence[TyreCurve]) -> Figure:
         figure = Figure(figsize=(COLUMN, 2.3), layout="constrained")
         side, along = figure.subplots(1, 2, sharey=True)
         for curve, look in zip(curves, looks(len(curves)), strict=True):
-            side.plot(np.rad2deg(curve.slip_angle), curve.lateral / 1e3, label=curve.label, **look)
+            side.plot(np.rad2deg(curve.slip_angle), curve.lateral / 1e3, label=plain(curve.label), **look)
             along.plot(curve.slip_ratio, curve.longitudinal / 1e3, **look)
         for axes in (side, along):
             axes.axhline(0, color=GUIDE, linewidth=0.5, zorder=1)

@@ -213,6 +213,6 @@ METHOD = Method(
         has_effect,
         plant="forces",
         swept=("orders", "draws", "excitations"),
-        foreign=("fit-eigen", "baseline", "sample.box", "sample.ellipsoid", "sample.ball", "test.ball"),
+        foreign=("fit-eigen", "baseline", "sample.box", "sample.point", "sample.ellipsoid", "sample.ball", "test.ball"),
     ),
 )

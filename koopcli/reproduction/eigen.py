@@ -265,6 +265,16 @@ METHOD = Method(
         has_effect,
         plant="slips",
         swept=("seeds", "cuts", "mu_scales", "beside"),
-        foreign=("fit-edmd", "baseline", "sample.grid", "sample.box", "sample.ball", "test.box"),
+        foreign=(
+            "fit-edmd",
+            "baseline",
+            "plot",
+            "sample.grid",
+            "sample.box",
+            "sample.point",
+            "sample.ball",
+            "test.box",
+            "test.point",
+        ),
     ),
 )

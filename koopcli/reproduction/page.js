@@ -15,7 +15,12 @@ const NARROW = 600; // pixels
       for (const axis of ["x", "y", "z"]) eye[axis] *= 1.45;
       layout.legend.y = -0.3;
     }
-    Plotly.newPlot(view, data, layout, { responsive: true, displaylogo: false })
+    Plotly.newPlot(view, data, layout, {
+      responsive: true,
+      displaylogo: false,
+      plotlyServerURL: "", // nothing here leaves the page
+      modeBarButtons: [["zoom3d", "pan3d", "orbitRotation", "resetCameraDefault3d", "toImage"]],
+    })
       .catch(() => figure.classList.remove("turnable"));
   }
 })();

@@ -123,8 +123,11 @@ def vehicles(experiment: Experiment) -> list[tuple[str, Experiment]]:
     for name in experiment.reproduce.beside:
         there = experiment.with_vehicle(name)
         label = Path(name).stem
-        if any(label == known for known, _ in found):
+        known = [label for label, _ in found]
+        if label in known:
             label = f"{label} as its file has it"
+        if label in known:
+            label = f"{label} ({len(known)})"
         if all(there.vehicle != one.vehicle for _, one in found):
             found.append((label, there))
     return found

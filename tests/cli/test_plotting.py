@@ -182,6 +182,15 @@ def test_a_vehicle_without_tyres_has_none_to_draw(koop, folder):
     one_line(koop("plot", "tyre", "--set", "vehicle.name=./bare.toml"), 3, "bare has no tyres", "[lateral]")
 
 
+@pytest.mark.parametrize("stem", ["x$\\foo$", "_car", "a$b$c^", "a-very-" + 8 * "long-" + "name-of-a-vehicle"])
+def test_whatever_a_vehicle_is_called(koop, folder, stem):
+    text = (data_folder() / "vehicles" / "ctu-2020.toml").read_text()
+    (folder / f"{stem}.toml").write_text(text)
+    for changed in ("vehicle.l_f=1.0", "vehicle.mu_scale=0.5"):
+        done = koop("plot", "tyre", "--set", f"vehicle.name=./{stem}.toml", "--set", changed)
+        assert done.code == 0, done.err
+
+
 def test_an_evaluation_where_everything_diverged(koop, monkeypatch):
     monkeypatch.setattr(metrics, "diverged", lambda predicted, domain: np.ones(len(predicted), dtype=bool))
     evaluation = koop("evaluate").name

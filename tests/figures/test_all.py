@@ -169,17 +169,19 @@ def test_nothing_global_is_left_behind():
     assert dict(mpl.rcParams) == before
 
 
-def test_a_changed_drawing_has_another_key(monkeypatch, tmp_path):
-    """Pictures are not compared, so the code that draws them is part of their recipe."""
+def test_a_changed_drawing_has_another_key(monkeypatch):
+    """Pictures are not compared, so the code that draws them, and what it takes numbers from, is in their recipe."""
     from koopcli import figures
 
-    before = figures.source_digest.__wrapped__()
-    for path in Path(figures.__file__).parent.glob("*.py"):
-        (tmp_path / path.name).write_bytes(path.read_bytes())
-    monkeypatch.setattr(figures, "__file__", str(tmp_path / "__init__.py"))
+    code = figures.drawing_code()
+    names = {f"{path.parent.name}/{path.name}" for path in code}
+    assert names >= {"figures/style.py", "config/paper.py", "simulation/sampling.py", "vehicles/tyre.py"}
+    assert all(path.is_file() for path in code)
+    before, read = figures.source_digest.__wrapped__(), Path.read_bytes
     assert figures.source_digest.__wrapped__() == before
-    (tmp_path / "style.py").write_text("# another style")
-    assert figures.source_digest.__wrapped__() != before
+    for changed in code:
+        monkeypatch.setattr(Path, "read_bytes", lambda path, changed=changed: read(path) + b"#" * (path == changed))
+        assert figures.source_digest.__wrapped__() != before
 
 
 def test_many_lines_are_all_different():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -129,14 +131,13 @@ def test_eigenvalues_of_modes_are_those_of_one_block():
 
 
 def test_growing_eigenvalues_are_told_apart_and_a_zero_has_no_rate():
-    A = np.diag([1.5, 0.5, 0.0])
-    found = np.linalg.eigvals(A)
-    with np.errstate(divide="ignore"):
-        shown = spectrum.Spectrum(found.astype(complex), np.log(found.astype(complex)), 1)
+    predictor = replace(_predictor(), A=np.diag([1.5, 0.5, 0.0, 0.5, 0.5, 0.5, 0.5, 1.0]))
+    shown = spectrum.select([Source("", None, {"predictor": predictor})], figure_settings("spectrum"))
+    assert np.sort(shown.rates.real)[0] == -np.inf
     circle, plane = spectrum.draw(shown).axes
     growing = [line for line in circle.lines if line.get_marker() == "^"]
     assert growing[0].get_xdata().tolist() == [1.5]
-    assert sum(len(line.get_xdata()) for line in plane.lines if line.get_marker() in ("o", "^")) == 2
+    assert sum(len(line.get_xdata()) for line in plane.lines if line.get_marker() in ("o", "^")) == 8
 
 
 def test_random_input_takes_any_predictor(plant):

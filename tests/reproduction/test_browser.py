@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -85,6 +86,14 @@ def test_it_opens_without_a_complaint_and_loads_nothing_else(opened):
     assert [name for name in loaded if not name.startswith("data:")] == []
     broken = opened.execute_script("return [...document.images].filter(one => !one.naturalWidth).length")
     assert broken == 0
+
+
+def test_no_button_sends_anything_away(opened):
+    buttons = opened.execute_script(
+        "return [...document.querySelectorAll(arguments[0] + ' .modebar-btn')].map(one => one.dataset.title)", VIEW
+    )
+    assert len(buttons) == 5
+    assert not [title for title in buttons if re.search("share|cloud|edit|upload", title, re.IGNORECASE)]
 
 
 def test_the_view_stands_for_the_picture_and_can_be_turned(opened):
