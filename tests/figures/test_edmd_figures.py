@@ -137,7 +137,7 @@ def test_growing_eigenvalues_are_told_apart_and_a_zero_has_no_rate():
     circle, plane = spectrum.draw(shown).axes
     growing = [line for line in circle.lines if line.get_marker() == "^"]
     assert growing[0].get_xdata().tolist() == [1.5]
-    assert sum(len(line.get_xdata()) for line in plane.lines if line.get_marker() in ("o", "^")) == 8
+    assert sum(len(line.get_xdata()) for line in plane.lines if line.get_marker() in ("o", "^")) == 7
 
 
 def test_random_input_takes_any_predictor(plant):
