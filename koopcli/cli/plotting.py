@@ -57,7 +57,7 @@ def plot(
     if output is not None and csv_ is not None and output.resolve() == csv_.resolve():
         raise UsageError(f"{output} cannot be both the image and its numbers: name two files")
     for path in (output, csv_):
-        if path is not None and (path.is_dir() or not os.access(path.parent, os.W_OK)):
+        if path is not None and (path.is_dir() or not os.access(path if _in_place(path) else path.parent, os.W_OK)):
             raise StorageError(f"cannot write {path}: name a file in a folder that can be written to")
     call = begin(store, experiment, set_, SECTIONS)
     from koopcli.figures.registry import FIGURES
@@ -102,9 +102,17 @@ def _format(output: Path | None) -> ImageFormat:
     raise InvalidValueError(f"{output}: unknown ending; write to a file ending in .{', .'.join(get_args(ImageFormat))}")
 
 
+def _in_place(path: Path) -> bool:
+    """Whether ``path`` must be written where it is: a device, a pipe, or a link that stays one."""
+    return path.exists() and (path.is_symlink() or not path.is_file())
+
+
 def _write(path: Path, content: bytes) -> None:
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
+        if _in_place(path):
+            path.write_bytes(content)
+            return
         beside.write_bytes(content)
         os.replace(beside, path)
     except OSError as error:

@@ -55,16 +55,13 @@ class Drawing:
         """The drawing for storage."""
         image = Array(np.frombuffer(self.image, dtype=np.uint8), ("byte",), "1")
         arrays = {"image": image, **{f"numbers/{name}": a for name, a in self.numbers.items()}}
-        return Packed(arrays, {"figure": self.figure, "format": self.format})
+        return Packed(arrays, {"figure": self.figure, "format": self.format, "columns": list(self.numbers)})
 
     @classmethod
     def unpack(cls, packed: Packed) -> Drawing:
         """The inverse of :meth:`pack`."""
-        numbers = {
-            name.removeprefix("numbers/"): Array(a.values[...], a.axes, a.units)
-            for name, a in packed.arrays.items()
-            if name.startswith("numbers/")
-        }
+        stored = {name: packed.arrays[f"numbers/{name}"] for name in packed.meta["columns"]}
+        numbers = {name: Array(a.values[...], a.axes, a.units) for name, a in stored.items()}
         return cls(
             packed.meta["figure"],
             packed.meta["format"],

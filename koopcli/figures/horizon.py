@@ -15,6 +15,7 @@ from koopcli.figures.style import COLUMN, legend_below, looks, plain_numbers, st
 from koopcli.records import Array, BoolArray, FloatArray, Trajectories
 
 QUANTILES = {"lower": 0.1, "median": 0.5, "upper": 0.9}
+BLOCK = 4096  # trajectories predicted together
 SHOWN_FROM = 1e-3  # %, of errors on a logarithmic axis; a start that is known is exact
 
 
@@ -44,10 +45,14 @@ def _over_time(source: Source, shown: BoolArray) -> ErrorOverTime:
     time = test.dt * np.arange(test.steps + 1.0)
     if not shown.any():
         return ErrorOverTime(source.label + LOST, time, *np.full((3, len(time)), np.nan))
-    x, u = np.asarray(test.x[:])[shown], np.asarray(test.u[:])[shown]
-    error = np.linalg.norm(predictor.predict(x[:, 0], u) - x, axis=2)
-    size = np.sqrt((x[:, evaluation.first :] ** 2).sum(axis=2).mean(axis=1))
-    relative = 100 * error / size[:, np.newaxis]
+    blocks = []
+    for start in range(0, len(shown), BLOCK):
+        rows, chosen = slice(start, start + BLOCK), shown[start : start + BLOCK]
+        x, u = np.asarray(test.x[rows])[chosen], np.asarray(test.u[rows])[chosen]
+        error = np.linalg.norm(predictor.predict(x[:, 0], u) - x, axis=2)
+        size = np.sqrt((x[:, evaluation.first :] ** 2).sum(axis=2).mean(axis=1))
+        blocks.append(100 * error / size[:, np.newaxis])
+    relative = np.concatenate(blocks)
     statistics = {name: np.quantile(relative, q, axis=0) for name, q in QUANTILES.items()}
     return ErrorOverTime(source.label, time, **statistics)
 

@@ -23,6 +23,7 @@ V = np.array([0.85, 0.45])  # velocity at the centre of gravity, drawn as a leng
 YAW_RATE = 0.18  # that it turns with, so that the velocities of the wheels fit the picture
 WHEEL = (0.62, 0.2)
 HEAD = "-|>,head_width=0.16,head_length=0.34"
+SMALL_HEAD = "-|>,head_width=0.1,head_length=0.2"
 MOTION, FORCE, ANGLE = COLOURS[0], COLOURS[1], COLOURS[2]
 
 
@@ -89,10 +90,11 @@ def draw(shown: Sequence[Arrow]) -> Figure:
             _arrow(axes, arrow)
         by_name = {arrow.name: arrow for arrow in shown}
         _angle(axes, FRONT, 0.0, STEER["f"], 1.12, r"$\delta_f$")
-        _angle(axes, REAR, STEER["r"], 0.0, 1.05, r"$\delta_r$")
+        _angle(axes, REAR, 0.0, STEER["r"], 1.05, r"$\delta_r$", along=STEER["r"])
         for axle, at, radius in (("f", FRONT, 0.66), ("r", REAR, 0.7)):
             head = by_name[f"$v_{axle}$"].head - at
-            _angle(axes, at, STEER[axle], float(np.arctan2(head[1], head[0])), radius, rf"$\alpha_{axle}$")
+            slip = float(np.arctan2(head[1], head[0]))
+            _angle(axes, at, slip, STEER[axle], radius, rf"$\alpha_{axle}$", along=STEER[axle])
         _yaw_rate(axes)
         _dimensions(axes)
     return figure
@@ -124,13 +126,16 @@ def _arrow(axes: Axes, arrow: Arrow) -> None:
     axes.text(*_point(arrow.text), arrow.name, color=arrow.colour, ha="center", va="center", zorder=8)
 
 
-def _angle(axes: Axes, at: FloatArray, start: float, end: float, radius: float, name: str) -> None:
-    """An arc between two directions, a line along the first."""
+def _angle(axes: Axes, at: FloatArray, start: float, end: float, radius: float, name: str, along: float = 0.0) -> None:
+    """An arc from one direction to another, the way in which the angle is positive, and a line ``along`` one."""
     low, high = sorted((start, end))
-    reach = (radius + 0.12) * np.array([np.cos(start), np.sin(start)])
+    reach = (radius + 0.12) * np.array([np.cos(along), np.sin(along)])
     axes.plot(*np.stack([at, at + reach]).T, "--", color=GUIDE, linewidth=0.7, zorder=1)
     arc = Arc(_point(at), 2 * radius, 2 * radius, theta1=np.rad2deg(low), theta2=np.rad2deg(high), color=ANGLE)
     axes.add_patch(arc)
+    rim = [at + radius * np.array([np.cos(a), np.sin(a)]) for a in (end - np.sign(end - start) * 0.04, end)]
+    look = {"arrowstyle": SMALL_HEAD, "color": ANGLE, "shrinkA": 0, "shrinkB": 0, "linewidth": 0.8}
+    axes.annotate("", _point(rim[1]), _point(rim[0]), arrowprops=look, zorder=5)
     middle = (start + end) / 2
     place = at + (radius + 0.16) * np.array([np.cos(middle), np.sin(middle)])
     axes.text(*_point(place), name, color=ANGLE, ha="center", va="center", zorder=8)

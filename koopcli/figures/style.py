@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from textwrap import fill
 from typing import Any
 
-import matplotlib as mpl
+from matplotlib import style as matplotlib_style
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
@@ -19,7 +19,7 @@ from koopcli.figures.colours import COLOURS, DASHES
 COLUMN = 3.5  # inches, one column of a two-column page
 
 WIDEST, HANDLE, LINE = 62, 10, 0.13  # letters of a legend in one column, of a line before its name; inches of a row
-NARROW = 200  # ratio of the ends of a logarithmic axis below which 2 and 5 are written too
+NARROW = 2000  # ratio of the ends of a logarithmic axis below which 2 and 5 are written too
 
 STYLE = {
     "font.size": 8,
@@ -101,8 +101,8 @@ def axis_label(name: str, unit: str) -> str:
 
 
 def style() -> AbstractContextManager[None]:
-    """The style for the time of a ``with``; no global state stays changed."""
-    return mpl.rc_context(STYLE)  # type: ignore[arg-type]
+    """The style for the time of a ``with``, over matplotlib's own defaults: a user's matplotlibrc changes nothing."""
+    return matplotlib_style.context(["default", STYLE])
 
 
 UNDATED: dict[str, dict[str, None]] = {

@@ -191,7 +191,8 @@ def _names(predictors: Sequence[Task]) -> list[str]:
         settings = [dict(_settings(predictors[i])) for i in group]
         differing = [key for key in settings[0] if any(one.get(key) != settings[0][key] for one in settings)]
         for i, one in zip(group, settings, strict=True):
-            found[i] = ", ".join([name, *(f"{key.split('.')[-1]} {_short(one.get(key))}" for key in differing)])
+            said = dict.fromkeys(f"{key.split('.')[-1]} {_short(one.get(key))}" for key in differing)
+            found[i] = ", ".join([name, *said])  # the vehicle's m stands in its sample and in its simulation
     return found
 
 

@@ -20,7 +20,7 @@ def _figures(drawing: Drawing) -> Meta:
 
 STAGE = Stage(
     name="plot",
-    version=3,
+    version=4,
     settings=lambda values: build(Plot, values),
     run=_run,
     unpack=Drawing.unpack,

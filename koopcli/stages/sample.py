@@ -58,7 +58,7 @@ def _check(task: Task) -> None:
     if isinstance(s, (GridSample, BoxSample)) and len(s.box) != len(names):
         raise InvalidValueError(f"'sample.box' must have one half-width for each of {', '.join(names)}, got {s.box}")
     if isinstance(s, PointSample) and len(s.x0) != len(names):
-        raise InvalidValueError(f"'sample.x0' must have one value for each of {', '.join(names)}, got {s.x0}")
+        raise InvalidValueError(f"'test.point.x0' must have one value for each of {', '.join(names)}, got {s.x0}")
     if isinstance(s, EllipsoidSample):
         sampling.check_mesh(s.mesh, s.count)
     refuse_beyond_memory("the sample", _estimate(task).bytes, "sample.count")

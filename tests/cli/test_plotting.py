@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import csv
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -197,6 +198,22 @@ def test_an_evaluation_where_everything_diverged(koop, monkeypatch):
     for name, kind in FIGURES.items():
         if kind.takes == "evaluation":
             one_line(koop("plot", name, evaluation), 3, "diverged: there is no error to draw")
+
+
+def test_the_numbers_come_in_the_order_they_are_drawn_in(koop, folder):
+    koop("plot", "random-input", "--csv", "one.csv")
+    header = (folder / "one.csv").read_text().splitlines()[0].split(",")
+    assert [name.split(" (")[0] for name in header[:4]] == ["time", "v_x/true", "v_y/true", "yaw_rate/true"]
+
+
+def test_a_link_stays_a_link_and_a_device_a_device(koop, folder):
+    (folder / "real.png").write_bytes(b"old")
+    (folder / "link.png").symlink_to("real.png")
+    assert koop("plot", "tyre", "-o", "link.png").code == 0
+    assert (folder / "link.png").is_symlink()
+    assert (folder / "real.png").read_bytes().startswith(b"\x89PNG")
+    assert koop("plot", "tyre", "--csv", "/dev/null").code == 0
+    assert Path("/dev/null").is_char_device()
 
 
 def test_where_an_image_cannot_be_written(koop, folder):

@@ -162,6 +162,13 @@ def test_one_lost_among_several_is_named_and_costs_the_others_nothing(name):
     assert sum("all diverged" in text for text in said) == 1
 
 
+def test_a_users_own_style_changes_nothing():
+    settings, records = figure_settings("tyre"), figure_records("tyre")
+    plain = drawing(settings, records).image
+    with mpl.rc_context({"axes.facecolor": "black", "lines.linewidth": 9, "savefig.bbox": "tight", "font.size": 20}):
+        assert drawing(settings, records).image == plain
+
+
 def test_nothing_global_is_left_behind():
     before = dict(mpl.rcParams)
     for name in FIGURES:
@@ -190,10 +197,13 @@ def test_many_lines_are_all_different():
 
 
 def test_colours_are_told_apart_in_print():
-    """Neighbours in the list differ in lightness, so that they do in black and white too."""
-    r, g, b = np.array([mpl.colors.to_rgb(colour) for colour in COLOURS[:3]]).T
-    lightness = 0.2126 * r + 0.7152 * g + 0.0722 * b
-    assert len(set(np.round(lightness, 2))) == 3
+    """The first two, which most figures use alone, differ in lightness, so that they do in black and white too."""
+    linear = [
+        [(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4) for c in mpl.colors.to_rgb(colour)]
+        for colour in COLOURS[:2]
+    ]
+    one, other = (116 * (np.array([0.2126, 0.7152, 0.0722]) @ c) ** (1 / 3) - 16 for c in linear)
+    assert abs(one - other) > 8  # of CIE L*, where 2 is just seen
 
 
 def test_short_columns_end_in_empty_cells():
