@@ -16,6 +16,7 @@ import plain
 
 import koopcli
 from koopcli.koopman import edmd
+from koopcli.koopman.bases import Choice
 from koopcli.koopman.evaluation import evaluate, join
 
 ORDER = 7
@@ -29,7 +30,7 @@ def cpu() -> float:
 def fit_product(store: Path):
     data = koopcli.load("simulate", store)
     yield
-    basis = edmd.basis_from_data(data, "tensor", ORDER)
+    basis = edmd.basis_from_data(data, Choice("tensor", ORDER))
     predictor = edmd.fit(data, basis)
     yield float(np.abs(predictor.A).sum())
 
@@ -41,14 +42,14 @@ def fit_blocks(store: Path):
 
     data = replace(koopcli.load("simulate", store), product=None)
     yield
-    basis = edmd.basis_from_data(data, "tensor", ORDER)
+    basis = edmd.basis_from_data(data, Choice("tensor", ORDER))
     predictor = edmd.fit(data, basis)
     yield float(np.abs(predictor.A).sum())
 
 
 def fit_plain(store: Path):
     data = koopcli.load("simulate", store)
-    basis = edmd.basis_from_data(data, "tensor", ORDER)
+    basis = edmd.basis_from_data(data, Choice("tensor", ORDER))
     x, u = data.x[:], data.u[:]
     yield
     A, _ = plain.fit(x[:, 0], u[:, 0], x[:, 1], basis.lift)

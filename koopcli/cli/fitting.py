@@ -18,7 +18,17 @@ from koopcli.cli.options import (
     names,
 )
 from koopcli.config.experiment import Changes, Values
-from koopcli.config.settings import BaselineKind, BasisName, Boundary, FitEdmd, FitEigen, LiftName
+from koopcli.config.settings import (
+    BaselineKind,
+    BasisName,
+    Boundary,
+    FitEdmd,
+    FitEigen,
+    LiftName,
+    Placement,
+    Solver,
+    Terms,
+)
 
 DATA = ("sample", "vehicle", "simulate")  # the sections behind trajectories
 
@@ -31,7 +41,46 @@ def fit_edmd(
     order: Annotated[int | None, typer.Option(help=f"Highest degree of each state ({FitEdmd.order}).")] = None,
     vehicle: VehicleOption = None,
     basis: Annotated[
-        BasisName | None, typer.Option(metavar=names(BasisName), help=f"Family of observables ({FitEdmd.basis}).")
+        BasisName | None,
+        typer.Option(
+            metavar=names(BasisName),
+            help="Family of observables: polynomials up to the order in each state (tensor), in total, or up to the "
+            "order in the yaw rate and to --degree-velocity in the velocity (anisotropic); thin-plate splines; the "
+            f"states alone, which is dynamic mode decomposition ({FitEdmd.basis}).",
+        ),
+    ] = None,
+    degree_velocity: Annotated[
+        int | None,
+        typer.Option(help=f"anisotropic: highest degree of v_x and v_y together ({FitEdmd.degree_velocity})."),
+    ] = None,
+    centres: Annotated[int | None, typer.Option(help=f"thin-plate: number of splines ({FitEdmd.centres}).")] = None,
+    placement: Annotated[
+        Placement | None,
+        typer.Option(
+            metavar=names(Placement),
+            help="thin-plate: centres at the means of clusters of the data, or drawn from a normal distribution with "
+            f"its mean and spread ({FitEdmd.placement}).",
+        ),
+    ] = None,
+    terms: Annotated[
+        Terms | None,
+        typer.Option(
+            metavar=names(Terms), help=f"How inputs act: B u, or B u and products u_i N_i z ({FitEdmd.terms})."
+        ),
+    ] = None,
+    ridge: Annotated[
+        float | None,
+        typer.Option(
+            help=f"Penalty on the coefficients, of scaled columns; the constant and B stay free ({FitEdmd.ridge:g})."
+        ),
+    ] = None,
+    solver: Annotated[
+        Solver | None,
+        typer.Option(
+            metavar=names(Solver),
+            help="Least squares in an orthonormal basis; cholesky-monomials solves the textbook's normal equations "
+            f"instead, to show where their digits end ({FitEdmd.solver}).",
+        ),
     ] = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
@@ -41,9 +90,22 @@ def fit_edmd(
 ) -> None:
     """Fit a Koopman predictor z⁺ = A z + B u, x̂ = C z by extended dynamic mode decomposition.
 
-    Example: koop fit-edmd --order 7
+    With --terms bilinear it is z⁺ = A z + B u + Σ u_i N_i z: the products of an input with powers of the yaw rate,
+    which no constant B can hold. The basis anisotropic has the powers it needs with few functions.
+
+    Example: koop fit-edmd --basis anisotropic --order 8 --terms bilinear
     """
-    given: Changes = {"fit-edmd": {"order": order, "basis": basis}, "vehicle": {"name": vehicle}}
+    fit: Values = {
+        "order": order,
+        "basis": basis,
+        "degree_velocity": degree_velocity,
+        "centres": centres,
+        "placement": placement,
+        "terms": terms,
+        "ridge": ridge,
+        "solver": solver,
+    }
+    given: Changes = {"fit-edmd": fit, "vehicle": {"name": vehicle}}
     call = begin(store, experiment, set_, (*DATA, "fit-edmd"), given)
     from koopcli.stages import recipes
 

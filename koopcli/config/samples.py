@@ -8,7 +8,7 @@ from typing import Literal, Self
 from koopcli.checks import setting
 
 Kind = Literal["grid", "box", "point", "ellipsoid", "ball"]
-Draw = Literal["random", "even"]
+Draw = Literal["random", "even", "chebyshev"]
 Mesh = Literal["sphere", "fibonacci"]
 Excitation = Literal["none", "fresh", "held"]
 PlantName = Literal["forces", "slips"]

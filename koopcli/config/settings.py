@@ -15,7 +15,10 @@ from koopcli.config.samples import SEED_LIMIT, Draw, Excitation, PlantName
 from koopcli.vehicles.parameters import MagicFormula, VehicleParameters
 
 ForcePer = Literal["axle", "wheel"]
-BasisName = Literal["tensor", "states"]
+BasisName = Literal["tensor", "total", "anisotropic", "thin-plate", "states"]
+Terms = Literal["linear", "bilinear"]
+Placement = Literal["k-means", "drawn"]
+Solver = Literal["orthonormal", "cholesky-monomials"]
 Boundary = Literal["thin-plate", "optimal"]
 LiftName = Literal["nearest"]
 Scaling = Literal["raw", "extent"]
@@ -77,12 +80,35 @@ UNUSED: dict[str, tuple[str, ...]] = {
 class FitEdmd:
     """EDMD with inputs."""
 
-    order: int = setting(7, low=1, high=1000, help="highest degree of each state")
+    order: int = setting(
+        7, low=1, high=1000, help="highest degree: of each state, of a product (total), of the yaw rate (anisotropic)"
+    )
     basis: BasisName = setting("tensor", help="family of observables; states alone is dynamic mode decomposition")
+    degree_velocity: int = setting(1, low=0, high=1000, help="anisotropic: highest degree of v_x and v_y together")
+    centres: int = setting(500, low=1, high=100_000, help="thin-plate: number of splines")
+    placement: Placement = setting(
+        "k-means", help="thin-plate: centres are means of clusters of the data, or drawn from a normal distribution"
+    )
+    seed: int = setting(0, low=0, high=SEED_LIMIT, help="thin-plate: seed of the centres")
+    terms: Terms = setting("linear", help="how inputs act: B u, or B u and u_i N_i z")
+    ridge: float = setting(0.0, low=0, high=1e6, help="penalty on the coefficients, of the scaled columns' size")
+    solver: Solver = setting(
+        "orthonormal", help="least squares; cholesky-monomials shows where the textbook's normal equations end"
+    )
 
     def settled(self) -> FitEdmd:
-        """The same fit with the order that does not matter at one."""
-        return replace(self, order=1) if self.basis == "states" else self
+        """The same fit with everything that its basis does not use at its default."""
+        idle = {name for names in OF_BASIS.values() for name in names} - set(OF_BASIS[self.basis])
+        return replace(self, **{name: getattr(FitEdmd, name) for name in idle})
+
+
+OF_BASIS: dict[str, tuple[str, ...]] = {
+    "tensor": ("order",),
+    "total": ("order",),
+    "anisotropic": ("order", "degree_velocity"),
+    "thin-plate": ("centres", "placement", "seed"),
+    "states": (),
+}
 
 
 @dataclass(frozen=True)

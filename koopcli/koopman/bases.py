@@ -1,8 +1,8 @@
-"""Bases of observables ψ(x). A new basis is one frozen class and one line in ``BASES``."""
+"""Bases of observables ψ(x) by name. A new basis is one frozen class in a file of its own and one line in ``BASES``."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar, Protocol
@@ -10,8 +10,9 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from koopcli.koopman.lifts import Lift, Observed
-from koopcli.koopman.orthonormal import OrthonormalPolynomials, orthonormal_polynomials
-from koopcli.records import Array, FloatArray, Packed
+from koopcli.koopman.polynomial import FAMILIES, Polynomial, polynomial
+from koopcli.koopman.thin_plate import ThinPlate, thin_plate_basis
+from koopcli.records import FloatArray, Packed
 
 
 class Basis(Lift, Protocol):
@@ -27,95 +28,6 @@ class Basis(Lift, Protocol):
 
     def group_moments(self, x: FloatArray, weights: FloatArray) -> FloatArray:
         """Σ_j weights[j] ψ(x[s, j]) as (n, q, N), for states in groups (n, m, n_x) and weights (m, q)."""
-
-
-@dataclass(frozen=True)
-class TensorPolynomial:
-    """All products p_a(x_1) p_b(x_2) … with each degree at most k: (k + 1)^n_x functions (docs/equations.md 3).
-
-    The factors are orthonormal on the training data, which spans what the monomials span: EDMD does not depend on
-    the choice, its condition number does. The last state's degree runs fastest; the first function is 1.
-    """
-
-    axes: tuple[OrthonormalPolynomials, ...]
-
-    @property
-    def constant(self) -> int:
-        """The product of the constants comes first."""
-        return 0
-
-    @property
-    def functions(self) -> int:
-        """Number of observables."""
-        return int(np.prod([axis.degree + 1 for axis in self.axes]))
-
-    @property
-    def state_map(self) -> FloatArray:
-        """C (n_x, N) with x = C ψ(x): each state is a combination of its own p_0 and p_1."""
-        sizes = [axis.degree + 1 for axis in self.axes]
-        C = np.zeros((len(sizes), self.functions))
-        for i, axis in enumerate(self.axes):
-            C[i, 0] = axis.centre + axis.scale * axis.alpha[0]
-            C[i, int(np.prod(sizes[i + 1 :]))] = axis.scale * axis.beta[1]
-        return C
-
-    def lift(self, x: FloatArray) -> FloatArray:
-        """ψ(x) (n, N) of the states (n, n_x)."""
-        z = np.ones((len(x), 1))
-        for i, axis in enumerate(self.axes):
-            z = (z[:, :, np.newaxis] * axis(x[:, i]).T[:, np.newaxis, :]).reshape(
-                len(x), z.shape[1] * (axis.degree + 1)
-            )
-        return z
-
-    def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
-        """rows · ψ(x) as (n, R), for ``rows`` (R, N)."""
-        return self.lift(x) @ rows.T
-
-    def onto(self, rows: FloatArray) -> Observed:
-        """The function of ``x`` (n, n_x) that observes ``rows`` (R, N)."""
-        return partial(self.observe, rows=rows)
-
-    def group_moments(self, x: FloatArray, weights: FloatArray) -> FloatArray:
-        """Σ_j weights[j] ψ(x[s, j]) as (n, q, N), for states in groups (n, m, n_x) and weights (m, q).
-
-        The sum over j is one small matrix product for each group, between the leading factors and the weighted last
-        one, so ψ itself is never formed.
-        """
-        n, m, _ = x.shape
-        *leading, last = [axis(x[..., i]) for i, axis in enumerate(self.axes)]  # (degree + 1, n, m) each
-        head = np.ones((1, n, m))
-        for factor in leading:
-            head = (head[:, np.newaxis] * factor).reshape(-1, n, m)
-        tail = (weights.T[:, np.newaxis, np.newaxis, :] * last).reshape(-1, n, m)  # (q · last, n, m)
-        product = np.matmul(head.transpose(1, 0, 2), tail.transpose(1, 2, 0))  # (n, head, q · last)
-        q = weights.shape[1]
-        moments: FloatArray = product.reshape(n, len(head), q, len(last)).transpose(0, 2, 1, 3).reshape(n, q, -1)
-        return moments
-
-    def pack(self) -> Packed:
-        """The recurrence coefficients of each factor."""
-        arrays: dict[str, Array] = {}
-        for i, axis in enumerate(self.axes):
-            arrays[f"{i}/map"] = Array(np.array([axis.centre, axis.scale]), ("centre and scale",), "that of the state")
-            arrays[f"{i}/alpha"] = Array(axis.alpha, ("degree",), "1")
-            arrays[f"{i}/beta"] = Array(axis.beta, ("degree",), "1")
-        return Packed(arrays, {"kind": "tensor", "axes": len(self.axes)})
-
-    @classmethod
-    def unpack(cls, packed: Packed) -> TensorPolynomial:
-        """The inverse of :meth:`pack`."""
-        values = {name: array.values[...] for name, array in packed.arrays.items()}
-        axes = []
-        for i in range(packed.meta["axes"]):
-            centre, scale = values[f"{i}/map"].tolist()
-            axes.append(OrthonormalPolynomials(centre, scale, values[f"{i}/alpha"], values[f"{i}/beta"]))
-        return cls(tuple(axes))
-
-
-def tensor_polynomial(nodes: Sequence[tuple[FloatArray, FloatArray]], order: int) -> TensorPolynomial:
-    """The tensor basis of ``order`` on (nodes, weights) for each state."""
-    return TensorPolynomial(tuple(orthonormal_polynomials(t, w, order) for t, w in nodes))
 
 
 @dataclass(frozen=True)
@@ -158,23 +70,55 @@ class States:
 
 
 @dataclass(frozen=True)
-class BasisKind:
-    """How a basis is made from the data's marginals and an order, counted beforehand, and restored."""
+class Choice:
+    """Which basis: ``kind`` of ``BASES`` with those of the other fields that it has a use for.
 
-    make: Callable[[Sequence[tuple[FloatArray, FloatArray]], int], Basis]
-    count: Callable[[int, int], int]
-    unpack: Callable[[Packed], Basis]
+    Polynomials: ``order``, the highest degree of each state (tensor), of a product (total) or of the last state
+    (anisotropic, where ``degree_velocity`` bounds the sum of the others'); ``raw`` monomials instead of orthonormal
+    ones. Thin plates: number of ``centres``, their ``placement`` of ``PLACEMENTS`` and its ``seed``.
+    """
+
+    kind: str = "tensor"
+    order: int = 1
+    degree_velocity: int = 1
+    raw: bool = False
+    centres: int = 1
+    placement: str = "k-means"
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class BasisKind:
+    """How a basis is made from training states ``x`` (n, n_x), and counted beforehand for a number of states.
+
+    ``degrees``: of each state's polynomials, which ask for one distinct value more; empty for other bases.
+    """
+
+    make: Callable[[FloatArray, Choice], Basis]
+    count: Callable[[Choice, int], int]
+    degrees: Callable[[Choice, int], tuple[int, ...]] = lambda choice, states: ()
+
+
+def _polynomials(family: str) -> BasisKind:
+    found = FAMILIES[family]
+    return BasisKind(
+        make=lambda x, c: polynomial(x, family, c.order, c.degree_velocity, raw=c.raw),
+        count=lambda c, states: found.count(c.order, c.degree_velocity, states),
+        degrees=lambda c, states: found.highest(c.order, c.degree_velocity, states),
+    )
 
 
 BASES: dict[str, BasisKind] = {
-    "tensor": BasisKind(
-        make=tensor_polynomial,
-        count=lambda order, states: (order + 1) ** states,
-        unpack=TensorPolynomial.unpack,
+    **{family: _polynomials(family) for family in FAMILIES},
+    "thin-plate": BasisKind(
+        make=lambda x, c: thin_plate_basis(x, c.centres, c.placement, c.seed),
+        count=lambda c, states: 1 + states + c.centres,
     ),
-    "states": BasisKind(
-        make=lambda nodes, order: States(len(nodes)),
-        count=lambda order, states: states,
-        unpack=States.unpack,
-    ),
+    "states": BasisKind(make=lambda x, c: States(x.shape[1]), count=lambda c, states: states),
+}
+
+STORED: dict[str, Callable[[Packed], Basis]] = {
+    "polynomial": Polynomial.unpack,
+    "thin-plate": ThinPlate.unpack,
+    "states": States.unpack,
 }

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.bases import BASES, Basis
+from koopcli.koopman.bases import BASES, Basis, Choice
 from koopcli.koopman.coverage import Coverage, coverage_of, spread
+from koopcli.koopman.inputs import WhiteInputs, white_inputs
 from koopcli.koopman.predictor import Predictor
-from koopcli.koopman.regression import condition_number, least_squares
+from koopcli.koopman.regression import RowBlocks, Solution, cholesky, condition_number, least_squares
 from koopcli.progress import Progress, silent
 from koopcli.records import FloatArray, Trajectories
 
@@ -20,29 +22,52 @@ MARGINAL_ROWS = 1 << 18  # rows that may shape the basis; the regression always 
 HULL_BLOCK = 1 << 15  # states whose hull is taken together
 
 
+@dataclass(frozen=True)
+class Method:
+    """How the regression is done: with ``bilinear`` terms u_i N_i z or without, with a ``ridge`` (4.7), and whether
+    by the plain normal equations of ``cholesky``.
+    """
+
+    bilinear: bool = False
+    ridge: float = 0.0
+    cholesky: bool = False
+
+
 class _Operators(NamedTuple):
     A: FloatArray
     B: FloatArray
+    N: FloatArray | None
     rank: int
     directions: int
     condition: float
 
 
-def basis_from_data(trajectories: Trajectories, kind: str, order: int) -> Basis:
-    """The basis ``kind`` of ``order`` on the distinct values that each state takes in the data, with their shares.
+def basis_from_data(trajectories: Trajectories, choice: Choice) -> Basis:
+    """The basis of a ``choice`` on the states that steps start from.
 
-    A product dataset shows them in its states; of more than ``MARGINAL_ROWS`` other samples a spread choice shapes
-    the basis, while the fit is over all of them.
+    A product dataset shows them once each; of more than ``MARGINAL_ROWS`` other samples a spread choice shapes the
+    basis, while the fit is over all of them. Raises ``InvalidValueError`` for a state with too few different values.
     """
+    x = _training_states(trajectories)
+    channels = trajectories.state_channels
+    for name, unit, values, degree in zip(
+        channels.names, channels.units, x.T, BASES[choice.kind].degrees(choice, x.shape[1]), strict=False
+    ):
+        distinct = len(np.unique(values))
+        if distinct <= degree:
+            what = f"{name} is {values[0]:g} {unit} throughout" if distinct == 1 else f"{name} has {distinct} values"
+            raise InvalidValueError(
+                f"{what} in the training data, which carries polynomials up to degree {distinct - 1}, not {degree}: "
+                "lower fit-edmd.order or fit-edmd.degree_velocity, or sample more values"
+            )
+    return BASES[choice.kind].make(x, choice)
+
+
+def _training_states(trajectories: Trajectories) -> FloatArray:
+    """The states that steps start from; of many only some."""
     if trajectories.factors is not None:
-        x = _factors(trajectories, trajectories.factors)[1]
-    else:
-        x = _spread_rows(trajectories, MARGINAL_ROWS)
-    nodes = []
-    for column in x.T:
-        values, counts = np.unique(column, return_counts=True)
-        nodes.append((values, counts / counts.sum()))
-    return BASES[kind].make(nodes, order)
+        return _factors(trajectories, trajectories.factors)[1]
+    return _spread_rows(trajectories, MARGINAL_ROWS)
 
 
 def _spread_rows(trajectories: Trajectories, limit: int) -> FloatArray:
@@ -56,28 +81,32 @@ def _spread_rows(trajectories: Trajectories, limit: int) -> FloatArray:
     return np.concatenate(found)
 
 
-def fit(trajectories: Trajectories, basis: Basis, progress: Progress = silent) -> Predictor:
-    """A, B of ψ(x⁺) ≈ A ψ(x) + B u by least squares over all one-step pairs (4.4); C is exact.
+def fit(trajectories: Trajectories, basis: Basis, method: Method = Method(), progress: Progress = silent) -> Predictor:
+    """A, B and N_i of ψ(x⁺) ≈ A ψ(x) + B u + Σ_i u_i N_i ψ(x) by least squares over all one-step pairs (4.4), (4.6).
 
-    On a product dataset of one step ψ(x) takes few distinct values and ψ(x⁺) can be averaged over the inputs first,
-    which is the same minimum for a fraction of the work (4.5); any other dataset is read in blocks. Raises
-    ``InvalidValueError`` for fewer samples than unknowns and for data that are not finite.
+    C is exact. On a product dataset of one step ψ(x) takes few distinct values and ψ(x⁺) can be averaged over the
+    inputs first, which is the same minimum for a fraction of the work (4.5); any other dataset is read in blocks, and
+    so is every one by ``cholesky``, which is to show what the plain method does.
+    Raises ``InvalidValueError`` for fewer samples than unknowns and for data that are not finite.
     """
     samples, n_u = len(trajectories) * trajectories.steps, len(trajectories.input_channels)
-    if samples < basis.functions + n_u:
+    unknowns = basis.functions * (1 + n_u) if method.bilinear else basis.functions + n_u
+    if samples < unknowns:
+        each = f", {unknowns} bilinear terms together" if method.bilinear else ""
         raise InvalidValueError(
-            f"{samples} samples cannot determine {basis.functions} functions and {n_u} inputs: "
-            "lower the order or sample more"
+            f"{samples} samples cannot determine {basis.functions} functions and {n_u} inputs{each}: "
+            "lower the order or the number of centres, or sample more"
         )
-    if trajectories.factors is not None and basis.constant is not None:
-        A, B, rank, directions, condition = _fit_product(trajectories, trajectories.factors, basis, progress)
+    if trajectories.factors is not None and basis.constant is not None and not method.cholesky:
+        A, B, N, rank, directions, condition = _fit_product(trajectories, trajectories.factors, basis, method, progress)
     else:
-        A, B, rank, directions, condition = _fit_blocks(trajectories, basis, progress)
+        A, B, N, rank, directions, condition = _fit_blocks(trajectories, basis, method, progress)
     return Predictor(
         observables=basis,
         A=A,
         B=B,
         C=basis.state_map,
+        N=N,
         dt=trajectories.dt,
         coverage=coverage(trajectories),
         state_channels=trajectories.state_channels,
@@ -90,85 +119,140 @@ def fit(trajectories: Trajectories, basis: Basis, progress: Progress = silent) -
     )
 
 
-def _fit_blocks(trajectories: Trajectories, basis: Basis, progress: Progress) -> _Operators:
-    """Least squares on the rows [ψ(x), u], read in blocks; u is centred where the basis has a constant.
-
-    Inputs that never move stay out of the regression, where they would only spoil its condition.
-    """
-    N, total = basis.functions, len(trajectories) * trajectories.steps
-    u_mean = np.zeros(len(trajectories.input_channels))
-    if basis.constant is not None:
-        u_mean = sum((u.sum(axis=0) for _, u, _ in trajectories.transitions(BLOCK)), u_mean) / total
-    moving = np.zeros(len(u_mean), dtype=bool)
-    for _, u, _ in trajectories.transitions(BLOCK):
-        moving |= _centred(u, u_mean).any(axis=0)
+def _fit_blocks(trajectories: Trajectories, basis: Basis, method: Method, progress: Progress) -> _Operators:
+    """Least squares on the rows [ψ(x), w] or [ψ(x), w ⊗ ψ(x)], read in blocks, with inputs w of mean square I."""
+    total = len(trajectories) * trajectories.steps
+    inputs = _all_inputs(trajectories, centred=basis.constant is not None)
+    apart = basis.constant is None or not method.bilinear  # else the constant's products are the inputs themselves
 
     def rows() -> Iterator[tuple[FloatArray, FloatArray]]:
         done = 0
         for x, u, x_next in trajectories.transitions(BLOCK):
-            yield np.hstack([basis.lift(x), _centred(u, u_mean)[:, moving]]), basis.lift(x_next)
+            z, w = basis.lift(x), inputs(u)
+            columns = [z, w] if apart else [z]
+            if method.bilinear:
+                columns.append((w[:, :, np.newaxis] * z[:, np.newaxis, :]).reshape(len(x), w.shape[1] * z.shape[1]))
+            yield np.hstack(columns), basis.lift(x_next)
             done += len(x)
             progress(done, total)
 
-    solution = least_squares(rows)
-    A, B = solution.coefficients[:N].T.copy(), np.zeros((N, len(u_mean)))
-    B[:, moving] = solution.coefficients[N:].T
-    directions = N + int(moving.sum())
-    return _Operators(_fold(A, B, u_mean, basis), B, solution.rank, directions, solution.condition)
+    functions, r, c = basis.functions, inputs.T.shape[1], basis.constant
+    free = [] if c is None else [c]
+    if c is None or apart:
+        free += range(functions, functions + r)
+    else:
+        free += [functions * (q + 1) + c for q in range(r)]
+    solution = _solve(rows, method, free)
+    found = solution.coefficients.T
+    A, rest = found[:, :functions], found[:, functions:]
+    B = rest[:, :r] if apart else None
+    N = rest[:, r if apart else 0 :].reshape(functions, r, functions).transpose(1, 0, 2) if method.bilinear else None
+    missing = int(inputs.moving.sum()) - r
+    directions = solution.coefficients.shape[0] + missing * (functions if method.bilinear else 1)
+    return _operators(A, B, N, inputs, basis, solution, rank=solution.rank, directions=directions)
 
 
-def _fit_product(trajectories: Trajectories, product: tuple[int, int], basis: Basis, progress: Progress) -> _Operators:
-    """The same minimum from the mean and the slope of ψ(x⁺) over the inputs of each state (4.5).
+def _fit_product(
+    trajectories: Trajectories, product: tuple[int, int], basis: Basis, method: Method, progress: Progress
+) -> _Operators:
+    """The same minimum from the mean and the slopes of ψ(x⁺) over the inputs of each state (4.5).
 
-    The centred inputs are orthogonal to every ψ(x), so A and B separate.
+    The inputs w of mean zero are orthogonal to every ψ(x), so A and B separate; of mean square I they are to one
+    another, so every N_i is a regression of its own slopes.
     """
     states, m = product
     columns, x = _factors(trajectories, product)
-    u_mean = columns.mean(axis=0)
-    centred = _centred(columns, u_mean)
-    length = np.linalg.norm(centred, axis=0)
-    moving = length > 0
-    left, singular, right = np.linalg.svd(centred[:, moving] / length[moving], full_matrices=False)
-    keep = singular > singular.max(initial=0.0) * np.finfo(float).eps * m
-    slopes = np.zeros(columns.shape)  # Σ_j slopes_j u_jᵀ is the identity on the inputs that move
-    slopes[:, moving] = (left[:, keep] / singular[keep]) @ right[keep] / length[moving]
-    weights = np.column_stack([np.full(m, 1 / m), slopes])
-    slope = np.zeros((columns.shape[1], basis.functions))
+    inputs = white_inputs(lambda: [columns], centred=True)
+    weights = np.column_stack([np.ones(m), inputs(columns)]) / m
+    functions, r = basis.functions, inputs.T.shape[1]
+    slope = np.zeros((r, functions))
     few = max(1, BLOCK // m)  # states whose successors are lifted together
 
     def rows() -> Iterator[tuple[FloatArray, FloatArray]]:
         slope[:] = 0
         for start in range(0, states, BLOCK):
             stop = min(start + BLOCK, states)
-            mean = np.empty((stop - start, basis.functions))
+            targets = np.empty((stop - start, functions * (1 + r if method.bilinear else 1)))
             for first in range(start, stop, few):
                 last = min(first + few, stop)
                 x_next = trajectories.x[first * m : last * m][:, 1].reshape(last - first, m, -1)
                 moments = basis.group_moments(x_next, weights)
-                mean[first - start : last - start] = moments[:, 0]
+                wanted = moments if method.bilinear else moments[:, 0]
+                targets[first - start : last - start] = wanted.reshape(last - first, -1)
                 slope[:] += moments[:, 1:].sum(axis=0)
                 progress(last, states)
-            yield basis.lift(x[start:stop]), mean
+            yield basis.lift(x[start:stop]), targets
 
-    solution = least_squares(rows)
-    A, B = solution.coefficients.T.copy(), slope.T / states
-    condition = condition_number(np.concatenate([solution.singular_values, singular]))
-    rank, directions = solution.rank + int(keep.sum()), basis.functions + int(moving.sum())
-    return _Operators(_fold(A, B, u_mean, basis), B, rank, directions, condition)
+    assert basis.constant is not None
+    solution = _solve(rows, method, [basis.constant])
+    A = solution.coefficients[:, :functions].T
+    B = N = None
+    if method.bilinear:
+        N = solution.coefficients[:, functions:].reshape(functions, r, functions).transpose(1, 2, 0)
+    else:
+        B = slope.T / states
+    each = functions if method.bilinear else 1
+    directions = functions + each * int(inputs.moving.sum())
+    rank = solution.rank * (1 + r) if method.bilinear else solution.rank + r
+    return _operators(A, B, N, inputs, basis, solution, rank=rank, directions=directions)
 
 
-def _centred(u: FloatArray, u_mean: FloatArray) -> FloatArray:
-    """``u - u_mean`` with what is only rounding set to zero: an input that never moves determines nothing."""
-    centred = u - u_mean
-    centred[np.abs(centred) <= 64 * np.finfo(float).eps * np.abs(u_mean)] = 0.0
-    return centred
+def _solve(rows: RowBlocks, method: Method, free: list[int]) -> Solution:
+    """The ridge leaves the constant and B ``free``, which the data determine well."""
+    return cholesky(rows) if method.cholesky else least_squares(rows, method.ridge, free)
 
 
-def _fold(A: FloatArray, B: FloatArray, u_mean: FloatArray, basis: Basis) -> FloatArray:
-    """A with B's share of the mean input in the column of the constant (4.5)."""
-    if basis.constant is not None:
-        A[:, basis.constant] -= B @ u_mean
-    return A
+def _all_inputs(trajectories: Trajectories, *, centred: bool) -> WhiteInputs:
+    return white_inputs(lambda: (u for _, u, _ in trajectories.transitions(BLOCK)), centred=centred)
+
+
+def _operators(
+    A: FloatArray,
+    B: FloatArray | None,
+    N: FloatArray | None,
+    inputs: WhiteInputs,
+    basis: Basis,
+    solution: Solution,
+    *,
+    rank: int,
+    directions: int,
+) -> _Operators:
+    """A, B (N, n_u) and N (n_u, N, N) for u instead of w, each term in one place.
+
+    ``A`` (N, N), ``B`` (N, r), ``N`` (r, N, N) are those of w; without ``B`` the constant's column of ``N`` holds it.
+    What the mean input adds goes into A, and the constant's products with an input into B.
+    """
+    A, c = A.copy(), basis.constant
+    in_B = np.zeros((len(A), len(inputs.mean))) if B is None else B @ inputs.T.T
+    terms = None if N is None else np.tensordot(inputs.T, N, axes=1)
+    if terms is not None:
+        A -= np.tensordot(inputs.mean, terms, axes=1)
+        if c is not None:
+            in_B = in_B + terms[:, :, c].T
+            terms[:, :, c] = 0.0
+    if c is not None and B is not None:
+        A[:, c] -= in_B @ inputs.mean
+    for found in (A, in_B, terms):
+        if found is not None and not np.isfinite(found).all():
+            raise InvalidValueError("the regression left the finite numbers: lower the order, or use a --ridge")
+    condition = condition_number(np.concatenate([solution.singular_values, inputs.singular]))
+    return _Operators(A, in_B, terms, rank, directions, condition)
+
+
+def why_deficient(trajectories: Trajectories, predictor: Predictor) -> str:
+    """What in the data leaves directions of a fit open, in words; nothing where it is their dependence alone."""
+    causes = []
+    x, functions = _training_states(trajectories), predictor.functions
+    distinct = len(np.unique(x, axis=0))
+    if distinct < functions:
+        causes.append(f"they hold {distinct} different states for {functions} functions")
+    still = [name for name, values in zip(trajectories.state_channels.names, x.T, strict=True) if not np.ptp(values)]
+    if still:
+        causes.append(f"{', '.join(still)} never changes")
+    inputs = _all_inputs(trajectories, centred=True)
+    if inputs.T.shape[1] < inputs.moving.sum():
+        causes.append("inputs move only together")
+    return " and ".join(causes)
 
 
 def _factors(trajectories: Trajectories, product: tuple[int, int]) -> tuple[FloatArray, FloatArray]:

@@ -12,6 +12,7 @@ from koopcli.errors import InvalidValueError
 from koopcli.koopman.coverage import coverage_of
 from koopcli.koopman.modes import ComplexArray, Modes, exponentials, newton_couplings
 from koopcli.koopman.predictor import TABLES, Predictor
+from koopcli.koopman.thin_plate import draw_centres, thin_plate
 from koopcli.records import FloatArray, Trajectories
 
 LARGEST_EXPONENT = 230.0  # e^230 = 1e100: products of a few such numbers are still finite
@@ -199,21 +200,6 @@ def _coordinates(basis: FloatArray, values: FloatArray) -> FloatArray:
     """``values`` (samples, m) in the columns of ``basis`` (samples, L), (L, m)."""
     size = _lengths(basis)
     return np.asarray(np.linalg.lstsq(basis / size, values, rcond=None)[0] / size[:, np.newaxis])
-
-
-def thin_plate(x: FloatArray, centres: FloatArray, scale: FloatArray) -> FloatArray:
-    """g(x) = r² log r with r the distance in ``scale``d coordinates (7.5), 0 at 0: (n, centres)."""
-    r2 = np.zeros((len(x), len(centres)))
-    for i in range(x.shape[1]):
-        r2 += ((x[:, i, np.newaxis] - centres[:, i]) / scale[i]) ** 2
-    return np.asarray(0.5 * r2 * np.log(np.where(r2 > 0, r2, 1.0)))
-
-
-def draw_centres(x: FloatArray, count: int, seed: int) -> FloatArray:
-    """``count`` points (count, n_x), normal with the mean and the standard deviation of all samples of ``x``."""
-    flat = x.reshape(-1, x.shape[-1])
-    drawn = np.random.default_rng(seed).standard_normal((count, flat.shape[1]))
-    return np.asarray(flat.mean(axis=0) + flat.std(axis=0) * drawn)
 
 
 def fit_given(x: FloatArray, g: FloatArray, modes: Modes, cut: float) -> Solution:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from koopcli.errors import InvalidValueError
-from koopcli.records import FloatArray
+from koopcli.records import Array, FloatArray
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,19 @@ class OrthonormalPolynomials:
         """The highest degree."""
         return len(self.alpha)
 
+    @property
+    def linear(self) -> tuple[float, float]:
+        """(a, b) with t = a + b p_1(t)."""
+        return self.centre + self.scale * float(self.alpha[0]), self.scale * float(self.beta[1])
+
+    def pack(self) -> dict[str, Array]:
+        """The map to [-1, 1] and the recurrence coefficients."""
+        return {
+            "map": Array(np.array([self.centre, self.scale]), ("centre and scale",), "that of the state"),
+            "alpha": Array(self.alpha, ("degree",), "1"),
+            "beta": Array(self.beta, ("degree",), "1"),
+        }
+
     def __call__(self, t: FloatArray) -> FloatArray:
         """Values (degree + 1, *t.shape), the degree first so that each polynomial is contiguous."""
         s = (t - self.centre) / self.scale
@@ -38,6 +51,26 @@ class OrthonormalPolynomials:
             if j > 0:
                 p[j + 1] -= self.beta[j] * p[j - 1]
             p[j + 1] /= self.beta[j + 1]
+        return p
+
+
+@dataclass(frozen=True)
+class Monomials:
+    """1, t, t², …: what orthonormal polynomials are measured against; a regression on them loses its digits."""
+
+    degree: int
+
+    linear = (0.0, 1.0)
+
+    def pack(self) -> dict[str, Array]:
+        """Nothing: the degrees of a basis say all."""
+        return {}
+
+    def __call__(self, t: FloatArray) -> FloatArray:
+        """Values (degree + 1, *t.shape)."""
+        p = np.ones((self.degree + 1, *t.shape))
+        for j in range(self.degree):
+            np.multiply(t, p[j], out=p[j + 1])
         return p
 
 

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.bases import BASES
+from koopcli.koopman.bases import STORED
 from koopcli.koopman.coverage import Coverage
 from koopcli.koopman.lifts import Lift, Observed
 from koopcli.koopman.modes import Modes
@@ -18,16 +18,17 @@ from koopcli.koopman.tabulated import Nearest
 from koopcli.records import Array, Channels, FloatArray, Meta, Packed
 
 SEGMENT = 128  # steps whose responses are formed together
+ROLLED = 1024  # trajectories whose lifted states are rolled together
 TABLES: dict[str, type[Nearest]] = {Nearest.kind: Nearest}  # lifts that look eigenfunctions up
 
 
 @dataclass(frozen=True)
 class Predictor:
-    """z⁺ = A z + B u, x̂ = C z with z = ψ(x): eqs. (4.1), (4.2) of docs/equations.md.
+    """z⁺ = A z + B u, x̂ = C z with z = ψ(x): eqs. (4.1), (4.2) of docs/equations.md; a bilinear one adds Σ_i u_i N_i z.
 
-    ``A`` (N, N) as a matrix or by its rates, ``B`` (N, n_u), ``C`` (n_x, N); ``dt`` in s; ``coverage``: where the
-    training states lie; ``plant`` what was identified, as JSON; ``rank`` of ``directions`` and ``condition`` of the
-    regression; ``horizon``: the steps that it may be asked for, None for any.
+    ``A`` (N, N) as a matrix or by its rates, ``B`` (N, n_u), ``C`` (n_x, N), ``N`` the N_i (n_u, N, N) or None; ``dt``
+    in s; ``coverage``: where the training states lie; ``plant`` what was identified, as JSON; ``rank`` of
+    ``directions`` and ``condition`` of the regression; ``horizon``: the steps that it may be asked for, None for any.
     """
 
     observables: Lift
@@ -44,6 +45,7 @@ class Predictor:
     spectral_radius: float
     horizon: int | None = None
     plant: Meta = field(default_factory=dict)
+    N: FloatArray | None = None
 
     @property
     def functions(self) -> int:
@@ -53,7 +55,7 @@ class Predictor:
     @property
     def knows_inputs(self) -> bool:
         """Whether inputs move the prediction at all."""
-        return bool(self.B.any())
+        return bool(self.B.any() or (self.N is not None and self.N.any()))
 
     def lift(self, x: FloatArray) -> FloatArray:
         """The lifted state z (..., N) of ``x`` (..., n_x)."""
@@ -81,17 +83,26 @@ class Predictor:
             )
         n, k = math.prod(x0.shape[:-1]), u.shape[-2]
         check_horizon(k, self.horizon)
-        x = response(self, x0.reshape(n, n_x), u.reshape(n, k, n_u))
+        respond = response if self.N is None else bilinear_response
+        x = respond(self, x0.reshape(n, n_x), u.reshape(n, k, n_u))
         return x.reshape(*x0.shape[:-1], k + 1, n_x)
 
     def step(self, x: FloatArray, u: FloatArray) -> FloatArray:
         """One step from the states ``x`` (n, n_x) lifted afresh, under ``u`` (n, n_u)."""
-        return self._onward(x) + u @ (self.C @ self.B).T
+        n_x = len(self.C)
+        onward = self._onward(x)
+        after = onward[:, :n_x] + u @ (self.C @ self.B).T
+        if self.N is not None:
+            after = after + np.einsum("ni,nij->nj", u, onward[:, n_x:].reshape(*u.shape, n_x))
+        return np.asarray(after)
 
     @cached_property
     def _onward(self) -> Observed:
-        """C A ψ(x)."""
-        return self.observables.onto(self.C @ self.A)
+        """C A ψ(x), and behind it C N_i ψ(x) for every input of a bilinear predictor."""
+        rows = self.C @ self.A
+        if self.N is not None:
+            rows = np.concatenate([rows, *(self.C @ self.N)])
+        return self.observables.onto(rows)
 
     def pack(self) -> Packed:
         """The predictor for storage."""
@@ -101,6 +112,7 @@ class Predictor:
             **_pack_operator(self.A),
             "B": Array(self.B, ("lifted", "input"), ", ".join(f"1/({unit})" for unit in self.input_channels.units)),
             "C": Array(self.C, ("state", "lifted"), state),
+            **_pack_bilinear(self.N, self.input_channels),
             **{f"coverage/{name}": array for name, array in coverage.arrays.items()},
             **{f"lift/{name}": array for name, array in observables.arrays.items()},
         }
@@ -135,6 +147,7 @@ class Predictor:
             A=A,
             B=arrays["B"].values[...],
             C=arrays["C"].values[...],
+            N=arrays["N"].values[...] if "N" in arrays else None,
             dt=meta["dt"],
             coverage=Coverage.unpack(Packed(_below("coverage/", arrays))),
             state_channels=Channels.unpack(meta["state_channels"]),
@@ -168,10 +181,16 @@ def _pack_operator(A: FloatArray | Modes) -> dict[str, Array]:
     }
 
 
+def _pack_bilinear(N: FloatArray | None, inputs: Channels) -> dict[str, Array]:
+    if N is None:
+        return {}
+    return {"N": Array(N, ("input", "lifted", "lifted"), ", ".join(f"1/({unit})" for unit in inputs.units))}
+
+
 def _unpack_lift(packed: Packed, A: FloatArray | Modes) -> Lift:
     """A table, which its modes carry on, or a basis."""
     kind = packed.meta["kind"]
-    return TABLES[kind].unpack(packed, A) if isinstance(A, Modes) else BASES[kind].unpack(packed)
+    return TABLES[kind].unpack(packed, A) if isinstance(A, Modes) else STORED[kind](packed)
 
 
 def _below(prefix: str, arrays: Mapping[str, Array]) -> dict[str, Array]:
@@ -205,6 +224,30 @@ def response(predictor: Predictor, x0: FloatArray, u: FloatArray) -> FloatArray:
             x[:, later + 1 : later + 1 + samples] += (inputs.reshape(n, inputs.shape[1] * n_u) @ acting).reshape(
                 n, samples, n_x
             )
+    return x
+
+
+def bilinear_response(predictor: Predictor, x0: FloatArray, u: FloatArray) -> FloatArray:
+    """x̂_k = C z_k with z⁺ = A z + B u + Σ_i u_i N_i z (4.6), (n, steps+1, n_x), for ``x0`` and ``u`` as above.
+
+    The system that acts on z changes with the input, so z itself is rolled, for ``ROLLED`` trajectories together: one
+    matrix product for a step and all its terms.
+    """
+    assert predictor.N is not None
+    assert not isinstance(predictor.A, Modes)
+    n, steps, n_u = u.shape
+    functions = predictor.functions
+    x = np.empty((n, steps + 1, len(predictor.C)))
+    every = np.concatenate([predictor.A, *predictor.N]).T  # z -> [A z, N_1 z, …]
+    for start in range(0, n, ROLLED):
+        rows = slice(start, start + ROLLED)
+        z = predictor.observables.lift(x0[rows])
+        x[rows, 0] = z @ predictor.C.T
+        for k in range(steps):
+            terms = (z @ every).reshape(len(z), 1 + n_u, functions)
+            acting = u[rows, k]
+            z = terms[:, 0] + np.einsum("ni,nif->nf", acting, terms[:, 1:]) + acting @ predictor.B.T
+            x[rows, k + 1] = z @ predictor.C.T
     return x
 
 

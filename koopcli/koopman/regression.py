@@ -6,7 +6,7 @@ otherwise a QR factorisation is updated block by block.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,12 +39,56 @@ def condition_number(singular_values: FloatArray) -> float:
     return float(singular_values.max()) / smallest if smallest > 0 else float("inf")
 
 
-def least_squares(blocks: RowBlocks) -> Solution:
+@dataclass(frozen=True)
+class _Normal:
+    """VᵀV and VᵀY over all ``rows``."""
+
+    gram: FloatArray
+    cross: FloatArray
+    rows: int
+
+
+def least_squares(blocks: RowBlocks, ridge: float = 0.0, free: Sequence[int] = ()) -> Solution:
     """Minimise Σ ‖Y_i - V_i W‖² over the blocks (V_i, Y_i) that each call of ``blocks()`` yields.
 
-    Columns of V are scaled to equal norm first, so that ``condition`` does not depend on units. A direction below
+    Columns of V are scaled to norm one first, so that ``condition`` does not depend on units. ``ridge`` times the sum
+    of squares of the coefficients of scaled columns is added (4.7), but for the columns ``free``. A direction below
     working precision is dropped, giving the solution of least norm; ``rank`` then tells.
     """
+    normal = _normal_equations(blocks)
+    scale = np.sqrt(np.diag(normal.gram))
+    scale[scale == 0] = 1.0
+    penalty = np.full(len(scale), ridge)
+    penalty[list(free)] = 0.0
+    gram = normal.gram / np.outer(scale, scale) + np.diag(penalty)
+    eigenvalues = np.linalg.eigvalsh(gram)
+    if eigenvalues[0] * GRAM_CONDITION > eigenvalues[-1] and (normal.rows >= len(gram) or ridge > 0):
+        W = np.linalg.solve(gram, normal.cross / scale[:, np.newaxis])
+        return Solution(W / scale[:, np.newaxis], np.sqrt(eigenvalues), len(gram))
+    return _by_qr(blocks, scale, normal.rows, penalty)
+
+
+def cholesky(blocks: RowBlocks) -> Solution:
+    """The same minimum from the normal equations as they stand, which squares the condition of columns as they are.
+
+    What a textbook writes and many programs do; it is here to show where it ends. Raises ``InvalidValueError`` when
+    rounding has left VᵀV without a factor.
+    """
+    from scipy.linalg import solve_triangular  # noqa: PLC0415  (other fits go without)
+
+    normal = _normal_equations(blocks)
+    try:
+        L = np.linalg.cholesky(normal.gram)
+    except np.linalg.LinAlgError as error:
+        raise InvalidValueError(
+            f"the normal equations of {len(normal.gram)} raw columns have lost all their digits (their matrix is not "
+            "positive definite any more): lower fit-edmd.order, or use the solver 'orthonormal'"
+        ) from error
+    W = solve_triangular(L.T, solve_triangular(L, normal.cross, lower=True))
+    return Solution(np.asarray(W), np.asarray(np.linalg.svd(L, compute_uv=False)), len(L))
+
+
+def _normal_equations(blocks: RowBlocks) -> _Normal:
     gram = cross = None
     rows = 0
     for V, Y in blocks():
@@ -56,24 +100,19 @@ def least_squares(blocks: RowBlocks) -> Solution:
         raise InvalidValueError("there are no samples to fit")
     if not (np.isfinite(gram).all() and np.isfinite(cross).all()):
         raise InvalidValueError("the training data hold values that are not finite: simulate a tamer sample")
-    scale = np.sqrt(np.diag(gram))
-    scale[scale == 0] = 1.0
-    gram = gram / np.outer(scale, scale)
-    eigenvalues = np.linalg.eigvalsh(gram)
-    if eigenvalues[0] * GRAM_CONDITION > eigenvalues[-1] and rows >= len(gram):
-        W = np.linalg.solve(gram, cross / scale[:, np.newaxis])
-        return Solution(W / scale[:, np.newaxis], np.sqrt(eigenvalues), len(gram))
-    return _by_qr(blocks, scale, rows)
+    return _Normal(gram, cross, rows)
 
 
-def _by_qr(blocks: RowBlocks, scale: FloatArray, rows: int) -> Solution:
+def _by_qr(blocks: RowBlocks, scale: FloatArray, rows: int, penalty: FloatArray) -> Solution:
     """The same minimum from the triangular factor of [V Y], kept while the blocks pass by."""
     columns = len(scale)
     triangle: FloatArray | None = None
     for V, Y in blocks():
         stacked = np.hstack([V / scale, Y])
-        above = np.empty((0, stacked.shape[1])) if triangle is None else triangle
-        triangle = np.asarray(np.linalg.qr(np.vstack([above, stacked]), mode="r"))
+        if triangle is None:
+            punished = np.diag(np.sqrt(penalty))[penalty > 0]
+            triangle = np.hstack([punished, np.zeros((len(punished), Y.shape[1]))])
+        triangle = np.asarray(np.linalg.qr(np.vstack([triangle, stacked]), mode="r"))
     assert triangle is not None
     R, S = triangle[:columns, :columns], triangle[:columns, columns:]
     U, singular, Vt = np.linalg.svd(R, full_matrices=False)

@@ -21,7 +21,12 @@ def _even(generator: np.random.Generator, half_width: float, count: int) -> Floa
     return np.linspace(-half_width, half_width, count)
 
 
-DRAWS: dict[str, Draw] = {"random": _random, "even": _even}
+def _chebyshev(generator: np.random.Generator, half_width: float, count: int) -> FloatArray:
+    """Zeros of a Chebyshev polynomial: denser towards the ends, where a polynomial is held the least."""
+    return -half_width * np.cos(np.pi * (np.arange(count) + 0.5) / count)
+
+
+DRAWS: dict[str, Draw] = {"random": _random, "even": _even, "chebyshev": _chebyshev}
 
 
 def grid(

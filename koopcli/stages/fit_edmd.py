@@ -4,30 +4,47 @@ from __future__ import annotations
 
 from koopcli.checks import build
 from koopcli.config.samples import GridSample
-from koopcli.config.settings import FitEdmd
+from koopcli.config.settings import OF_BASIS, FitEdmd
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import edmd
-from koopcli.koopman.bases import BASES
+from koopcli.koopman.bases import BASES, Basis, Choice
+from koopcli.koopman.polynomial import FAMILIES
 from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.thin_plate import ThinPlate
 from koopcli.records import Trajectories
 from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task
 from koopcli.stages.predictors import describe, figures
 from koopcli.store.files import size_text
 from koopcli.vehicles.plants import PLANTS
 
-FUNCTIONS_LIMIT = 4096
+TERMS_LIMIT = 4096  # coefficients of one lifted state
+HARMLESS = 1e14  # a condition number that leaves two digits
 
 
 def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
     trajectories: Trajectories = inputs["trajectories"]
-    basis = edmd.basis_from_data(trajectories, settings.basis, settings.order)
-    predictor = edmd.fit(trajectories, basis, context.progress)
+    plain = settings.solver == "cholesky-monomials"
+    basis = edmd.basis_from_data(trajectories, _choice(settings))
+    _warn_of_centres(basis, trajectories, context)
+    method = edmd.Method(settings.terms == "bilinear", settings.ridge, plain)
+    predictor = edmd.fit(trajectories, basis, method, context.progress)
     if predictor.rank < predictor.directions:
+        because = edmd.why_deficient(trajectories, predictor)
         context.warn(
             f"the data determine {predictor.rank} of {predictor.directions} directions (condition "
-            f"{predictor.condition:.1e}); the others were set to zero: sample more states or inputs, or lower the order"
+            f"{predictor.condition:.1e}){f' because {because}' if because else ''}; the others were set to zero: "
+            "sample more states or inputs, lower the order or the number of centres, or use a --ridge"
         )
-    still = [name for name, b in zip(predictor.input_channels.names, predictor.B.T, strict=True) if not b.any()]
+    elif plain and predictor.condition > HARMLESS:
+        context.warn(
+            f"the normal equations of raw monomials have condition {predictor.condition:.1e}, squared: what this "
+            "predictor shows is rounding as much as the method; use the solver 'orthonormal'"
+        )
+    still = [
+        name
+        for i, name in enumerate(predictor.input_channels.names)
+        if not predictor.B[:, i].any() and (predictor.N is None or not predictor.N[i].any())
+    ]
     if still:
         context.warn(
             f"{', '.join(still)} never moved in these data, so B is zero there: the predictor knows nothing of it"
@@ -35,8 +52,36 @@ def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
     return predictor
 
 
+def _warn_of_centres(basis: Basis, trajectories: Trajectories, context: Context) -> None:
+    if isinstance(basis, ThinPlate):
+        outside = int(edmd.coverage(trajectories).outside(basis.centres).sum())
+        if outside:
+            context.warn(
+                f"{outside} of {len(basis.centres)} centres lie outside the data, where splines only grow: "
+                "--placement k-means keeps them inside"
+            )
+
+
+def _choice(settings: FitEdmd) -> Choice:
+    return Choice(
+        settings.basis,
+        settings.order,
+        settings.degree_velocity,
+        settings.solver == "cholesky-monomials",
+        settings.centres,
+        settings.placement,
+        settings.seed,
+    )
+
+
 def _functions(task: Task) -> int:
-    return BASES[task.settings.basis].count(task.settings.order, len(PLANTS[_plant(task)].states))
+    return BASES[task.settings.basis].count(_choice(task.settings), len(PLANTS[_plant(task)].states))
+
+
+def _terms(task: Task) -> int:
+    """Coefficients of each lifted state."""
+    n_u = len(PLANTS[_plant(task)].inputs)
+    return _functions(task) * (1 + n_u) if task.settings.terms == "bilinear" else _functions(task) + n_u
 
 
 def _plant(task: Task) -> str:
@@ -50,40 +95,77 @@ def _prospect(task: Task) -> Prospect:
     if sample is not None:
         drawn = sample.settings
         about = f"{drawn.draw} {drawn.seed}" if isinstance(drawn, GridSample) else drawn.kind
-    if settings.basis == "states":
-        return Prospect(_functions(task), None, "DMD", about)
-    return Prospect(_functions(task), None, f"EDMD, order {settings.order}", about, settings.order)
+    name = NAMES[settings.basis].format(**vars(settings))
+    if settings.terms == "bilinear":
+        name = f"bilinear {name}"
+    order = settings.order if "order" in OF_BASIS[settings.basis] else None
+    return Prospect(_functions(task), None, name, about, order)
+
+
+NAMES = {
+    "tensor": "EDMD, order {order}",
+    "total": "EDMD, total degree {order}",
+    "anisotropic": "EDMD, degrees {degree_velocity} and {order}",
+    "thin-plate": "EDMD, {centres} splines",
+    "states": "DMD",
+}
 
 
 def _check(task: Task) -> None:
-    order, N = task.settings.order, _functions(task)
-    if N > FUNCTIONS_LIMIT:
+    settings, N = task.settings, _functions(task)
+    lower = "fit-edmd.centres" if settings.basis == "thin-plate" else "fit-edmd.order"
+    if _terms(task) > TERMS_LIMIT:
         raise InvalidValueError(
-            f"'fit-edmd.order' {order} needs {N:,} functions and {size_text(8.0 * N**2)} for A alone; "
-            f"the limit is {FUNCTIONS_LIMIT:,} functions: lower the order"
+            f"'{lower}' {getattr(settings, lower.partition('.')[2])} needs {N:,} functions with {_terms(task):,} "
+            f"{settings.terms} terms and {size_text(8.0 * N * _terms(task))} for them; the limit is {TERMS_LIMIT:,} "
+            "terms: lower it"
         )
+    if settings.solver == "cholesky-monomials":
+        if settings.basis not in FAMILIES:
+            raise InvalidValueError(
+                f"the solver 'cholesky-monomials' is for polynomials, not for the basis '{settings.basis}': "
+                "use the solver 'orthonormal'"
+            )
+        if settings.ridge > 0:
+            raise InvalidValueError(
+                "the solver 'cholesky-monomials' shows the plain regression, without 'fit-edmd.ridge': "
+                "use the solver 'orthonormal'"
+            )
     sample = task.find("sample")
-    too_few = sample is not None and isinstance(sample.settings, GridSample) and order >= sample.settings.count
-    if sample is not None and too_few and task.settings.basis != "states":
-        count = sample.settings.count
+    if sample is not None and isinstance(sample.settings, GridSample):
+        _check_grid(task, sample.settings)
+
+
+def _check_grid(task: Task, grid: GridSample) -> None:
+    """Refuse what the values of a grid cannot determine."""
+    settings, n_x = task.settings, len(grid.box)
+    highest = max(BASES[settings.basis].degrees(_choice(settings), n_x), default=0)
+    if highest >= grid.count:
+        name = "order" if highest == settings.order else "degree_velocity"
         raise InvalidValueError(
-            f"'fit-edmd.order' {order} is too high for {count} values per state, which carry orders up to "
-            f"{count - 1}: lower the order or raise sample.count"
+            f"'fit-edmd.{name}' {highest} is too high for {grid.count} values per state, which carry orders up to "
+            f"{grid.count - 1}: lower the order or raise sample.count"
+        )
+    if settings.basis == "thin-plate" and _functions(task) > grid.count**n_x:
+        raise InvalidValueError(
+            f"'fit-edmd.centres' {settings.centres} is too many for {grid.count**n_x:,} different states: lower it or "
+            "raise sample.count"
         )
 
 
 def _estimate(task: Task) -> Cost:
-    N = _functions(task)
+    N, terms = _functions(task), _terms(task)
     sample, plant = task.ancestor("sample").settings, task.ancestor("simulate").settings
     samples = sample.trajectories * plant.steps
-    crossed = isinstance(sample, GridSample) and plant.steps == 1
-    states = samples // (len(sample.levels) * sample.columns) if crossed else 2 * samples
-    return Cost(1e-6 * samples + 5e-11 * states * N**2 + 1.5e-9 * N**3, 8.0 * N**2)
+    crossed = isinstance(sample, GridSample) and plant.steps == 1 and task.settings.solver == "orthonormal"
+    rows = samples // (len(sample.levels) * sample.columns) if crossed else 2 * samples
+    lifting = (1e-8 * task.settings.centres if task.settings.basis == "thin-plate" else 1e-6) * samples
+    return Cost(lifting + 5e-11 * rows * N * terms + 1.5e-9 * N**3, 8.0 * N * terms)
 
 
 STAGE = Stage(
     name="fit-edmd",
-    version=2,
+    version=3,
     settings=lambda values: build(FitEdmd, values),
     run=_run,
     unpack=Predictor.unpack,

@@ -177,4 +177,4 @@ def test_the_baselines_of_one_method_ignore_the_settings_of_the_other(koop, fold
     (folder / "mine.toml").write_text(text)
     plan = koop("reproduce", "eigen", "--experiment", "mine.toml", "--dry-run", "--json", tiny=False)
     fits = [s["settings"] for s in json.loads(plan.out)["steps"] if s["name"].startswith("fit-edmd")]
-    assert {(fit["basis"], fit["order"]) for fit in fits} == {("states", 1), ("tensor", 3), ("tensor", 5)}
+    assert {(fit["basis"], fit["order"]) for fit in fits} == {("states", 7), ("tensor", 3), ("tensor", 5)}

@@ -16,6 +16,7 @@ from koopcli.figures.registry import FIGURES
 from koopcli.koopman.baselines import FORECASTS
 from koopcli.koopman.bases import BASES
 from koopcli.koopman.predictor import TABLES
+from koopcli.koopman.thin_plate import PLACEMENTS
 from koopcli.simulation.sampling import DRAWS, MESHES
 from koopcli.vehicles.plants import PLANTS
 from koopcli.vehicles.single_track import WHEELS_PER_FORCE
@@ -30,6 +31,8 @@ PAPER = tomllib.loads((data_folder() / "experiments" / "paper.toml").read_text()
         (samples.PlantName, PLANTS),
         (settings.ForcePer, WHEELS_PER_FORCE),
         (settings.BasisName, BASES),
+        (settings.BasisName, settings.OF_BASIS),
+        (settings.Placement, PLACEMENTS),
         (settings.FigureName, FIGURES),
         (samples.Kind, samples.SAMPLES),
         (samples.Kind, samples.SAMPLED_FOR),

@@ -13,6 +13,7 @@ from koopcli.figures import orders, random_input, spectrum
 from koopcli.figures.drawing import Source
 from koopcli.figures.orders import OrderErrors
 from koopcli.koopman import edmd
+from koopcli.koopman.bases import Choice
 from koopcli.koopman.modes import Modes
 from koopcli.koopman.restarts import restarted
 from koopcli.records import Trajectories
@@ -143,7 +144,7 @@ def test_growing_eigenvalues_are_told_apart_and_a_zero_has_no_rate():
 def test_random_input_takes_any_predictor(plant):
     """It asks for states and inputs, not for the method."""
     data = _trajectories(7)
-    dmd = edmd.fit(data, edmd.basis_from_data(data, "states", 1))
+    dmd = edmd.fit(data, edmd.basis_from_data(data, Choice("states", 1)))
     shown = random_input.select(
         [Source("", None, {"predictor": dmd, "trajectories": data})], Plot("random-input", "png", "", restart=2)
     )

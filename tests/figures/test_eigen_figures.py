@@ -20,6 +20,7 @@ from koopcli.figures import (
 )
 from koopcli.figures.drawing import Source
 from koopcli.koopman import edmd
+from koopcli.koopman.bases import Choice
 from koopcli.koopman.eigenfunctions import fit
 from koopcli.koopman.evaluation import evaluate
 from koopcli.records import Sample
@@ -180,7 +181,7 @@ def test_the_states_tell_their_surface(slips, mesh):
 
 
 def test_they_do_not_ask_for_the_method(made):
-    basis = edmd.basis_from_data(made["training"], "states", 1)
+    basis = edmd.basis_from_data(made["training"], Choice("states", 1))
     dmd = edmd.fit(made["training"], basis)
     other = {**made, "predictor": dmd, "evaluation": evaluate(dmd, made["trajectories"], slice(None), 0)}
     for module in (error_map, error_side, mean_trajectory, rmse_histogram, horizon, compare, density):

@@ -13,18 +13,18 @@ from koopcli.config.data import locate
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import edmd
 from koopcli.koopman.baselines import FORECASTS, Forecast
+from koopcli.koopman.bases import Choice
 from koopcli.koopman.eigenfunctions import (
     check_growth,
     dmd_rates,
-    draw_centres,
     fit,
     lattice,
     lattice_size,
-    thin_plate,
 )
 from koopcli.koopman.evaluation import evaluate
 from koopcli.koopman.modes import exponentials
 from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.thin_plate import draw_centres, thin_plate
 from koopcli.records import Channels, Trajectories
 from koopcli.vehicles.parameters import read_vehicle
 from koopcli.vehicles.single_track import SlipInput
@@ -297,7 +297,7 @@ def test_the_baselines(full, vehicle):
         one = Forecast(kind, 0.01, coverage, training.state_channels, training.input_channels, about)
         found = evaluate(one, test, slice(None), 0).figures()["rmse"]["mean"]
         assert found == pytest.approx(expected[kind], abs=0.6)
-    dmd = edmd.fit(training, edmd.basis_from_data(training, "states", 1))
+    dmd = edmd.fit(training, edmd.basis_from_data(training, Choice("states", 1)))
     assert evaluate(dmd, test, slice(None), 0).figures()["rmse"]["mean"] == pytest.approx(expected["dmd"], abs=0.6)
 
 

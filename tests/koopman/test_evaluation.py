@@ -7,6 +7,7 @@ import pytest
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import edmd
+from koopcli.koopman.bases import Choice
 from koopcli.koopman.eigenfunctions import fit
 from koopcli.koopman.evaluation import Evaluation, evaluate, join
 from koopcli.vehicles.single_track import SlipInput
@@ -16,7 +17,7 @@ from tests.conftest import ball_of, box_sample, grid_sample, surface_of, traject
 @pytest.fixture(scope="module")
 def pair(plant):
     data = trajectories_of(plant, grid_sample(count=7, columns=3), 1)
-    predictor = edmd.fit(data, edmd.basis_from_data(data, "tensor", 3))
+    predictor = edmd.fit(data, edmd.basis_from_data(data, Choice("tensor", 3)))
     return predictor, trajectories_of(plant, box_sample(50, steps=8), 8)
 
 

@@ -6,6 +6,7 @@ import pytest
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import edmd
 from koopcli.koopman import predictor as module
+from koopcli.koopman.bases import Choice
 from koopcli.koopman.predictor import Predictor
 from tests.conftest import grid_sample, trajectories_of
 
@@ -13,7 +14,7 @@ from tests.conftest import grid_sample, trajectories_of
 @pytest.fixture(scope="module")
 def predictor(plant):
     data = trajectories_of(plant, grid_sample(count=7, columns=3), 1)
-    return edmd.fit(data, edmd.basis_from_data(data, "tensor", 3))
+    return edmd.fit(data, edmd.basis_from_data(data, Choice("tensor", 3)))
 
 
 @pytest.fixture

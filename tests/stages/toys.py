@@ -7,6 +7,7 @@ result moved.
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +17,11 @@ from koopcli.config.samples import BallSample, BoxSample, EllipsoidSample, GridS
 from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Plot, Series, Simulate, Tyres
 from koopcli.figures.registry import FIGURES
 from koopcli.koopman.baselines import Forecast
-from koopcli.koopman.bases import TensorPolynomial
 from koopcli.koopman.coverage import Coverage
 from koopcli.koopman.evaluation import Evaluation
 from koopcli.koopman.modes import Modes
 from koopcli.koopman.orthonormal import OrthonormalPolynomials
+from koopcli.koopman.polynomial import Polynomial
 from koopcli.koopman.predictor import Predictor
 from koopcli.koopman.tabulated import Nearest
 from koopcli.progress import silent
@@ -72,7 +73,7 @@ def _flat() -> Trajectories:
 
 def _predictor(growth: float = 0.95) -> Predictor:
     axis = OrthonormalPolynomials(0.5, 20.0, np.array([0.1]), np.array([1.0, 0.6]))
-    basis = TensorPolynomial((axis, axis, axis))
+    basis = Polynomial((axis, axis, axis), np.array(list(np.ndindex(2, 2, 2))))
     A = growth * np.eye(8) + 0.01 * np.cos(np.arange(64.0)).reshape(8, 8)
     B = 1e-4 * np.sin(np.arange(32.0)).reshape(8, 4)
     return Predictor(basis, A, B, basis.state_map, 0.01, _coverage(), STATES, INPUTS, 12, 12, 1.0, 1.0)
@@ -111,6 +112,10 @@ def _forecast(kind: str) -> Forecast:
     vehicle = {**vars(CAR), "lateral": vars(CAR.lateral), "longitudinal": vars(CAR.longitudinal)}
     plant = {"plant": "slips", "force_per": "axle", "v_eps": 0.1, "vehicle": vehicle}
     return Forecast(kind, 0.01, _coverage(), STATES, INPUTS, plant)
+
+
+def _bilinear() -> Predictor:
+    return replace(_predictor(), N=1e-3 * np.cos(np.arange(256.0) ** 2).reshape(4, 8, 8))
 
 
 def _evaluation() -> Evaluation:
@@ -203,6 +208,7 @@ TOYS = {
         (BallSample(count=5, m=1200.0, Jzz=1500.0), {}),
         (PointSample(steps=4), {}),
         (PointSample(x0=(3.0, 2.0, 1.0), excitation="held", seed=5), {}),
+        (GridSample(seed=3, count=4, columns=2, draw="chebyshev"), {}),
     ],
     "simulate": [
         (Simulate(vehicle=CAR, plant="forces", steps=3), {"sample": _sample()}),
@@ -214,6 +220,10 @@ TOYS = {
         (FitEdmd(order=2), {"trajectories": _trajectories(3)}),
         (FitEdmd(order=1), {"trajectories": _flat()}),
         (FitEdmd(basis="states"), {"trajectories": _gliding()}),
+        (FitEdmd(basis="anisotropic", order=2, terms="bilinear", ridge=1e-3), {"trajectories": _trajectories(1)}),
+        (FitEdmd(basis="total", order=2, terms="bilinear"), {"trajectories": _trajectories(3)}),
+        (FitEdmd(basis="thin-plate", centres=5, placement="drawn", seed=2), {"trajectories": _trajectories(1)}),
+        (FitEdmd(order=1, solver="cholesky-monomials"), {"trajectories": _trajectories(1)}),
     ],
     "fit-eigen": [
         (FitEigen(centres=4, tabulate=0.05, cut=1e-6), {"trajectories": _gliding()}),
@@ -228,6 +238,7 @@ TOYS = {
         (Evaluate(chunk=100, first=1), {"predictor": _predictor(), "trajectories": _trajectories(4)}),
         (Evaluate(chunk=100, first=1), {"predictor": _predictor(growth=250.0), "trajectories": _trajectories(4)}),
         (Evaluate(chunk=100, first=0), {"predictor": _looked_up(), "trajectories": _calm()}),
+        (Evaluate(chunk=100, first=1), {"predictor": _bilinear(), "trajectories": _trajectories(4)}),
         *(
             (Evaluate(chunk=100, first=0), {"predictor": _forecast(kind), "trajectories": _calm()})
             for kind in ("hold", "rotation", "linearisation")
