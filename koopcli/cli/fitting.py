@@ -65,7 +65,9 @@ def fit_edmd(
     terms: Annotated[
         Terms | None,
         typer.Option(
-            metavar=names(Terms), help=f"How inputs act: B u, or B u and products u_i N_i z ({FitEdmd.terms})."
+            metavar=names(Terms),
+            help="How inputs act: B u; B u and products u_i N_i z; or such a system in continuous time, whose held "
+            f"inputs act exactly ({FitEdmd.terms}).",
         ),
     ] = None,
     ridge: Annotated[
@@ -91,7 +93,8 @@ def fit_edmd(
     """Fit a Koopman predictor z⁺ = A z + B u, x̂ = C z by extended dynamic mode decomposition.
 
     With --terms bilinear it is z⁺ = A z + B u + Σ u_i N_i z: the products of an input with powers of the yaw rate,
-    which no constant B can hold. The basis anisotropic has the powers it needs with few functions.
+    which no constant B can hold. The basis anisotropic has the powers it needs with few functions. With --terms
+    generator the same data give ż = (K_0 + Σ u_i K_i) z, whose step also has what is quadratic in large inputs.
 
     Example: koop fit-edmd --basis anisotropic --order 8 --terms bilinear
     """

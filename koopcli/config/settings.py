@@ -16,7 +16,7 @@ from koopcli.vehicles.parameters import MagicFormula, VehicleParameters
 
 ForcePer = Literal["axle", "wheel"]
 BasisName = Literal["tensor", "total", "anisotropic", "thin-plate", "states"]
-Terms = Literal["linear", "bilinear"]
+Terms = Literal["linear", "bilinear", "generator"]
 Placement = Literal["k-means", "drawn"]
 Solver = Literal["orthonormal", "cholesky-monomials"]
 Boundary = Literal["thin-plate", "optimal"]
@@ -90,7 +90,7 @@ class FitEdmd:
         "k-means", help="thin-plate: centres are means of clusters of the data, or drawn from a normal distribution"
     )
     seed: int = setting(0, low=0, high=SEED_LIMIT, help="thin-plate: seed of the centres")
-    terms: Terms = setting("linear", help="how inputs act: B u, or B u and u_i N_i z")
+    terms: Terms = setting("linear", help="how inputs act: B u; with u_i N_i z; or so in continuous time")
     ridge: float = setting(0.0, low=0, high=1e6, help="penalty on the coefficients, of the scaled columns' size")
     solver: Solver = setting(
         "orthonormal", help="least squares; cholesky-monomials shows where the textbook's normal equations end"

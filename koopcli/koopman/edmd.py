@@ -11,6 +11,7 @@ import numpy as np
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.bases import BASES, Basis, Choice
 from koopcli.koopman.coverage import Coverage, coverage_of, spread
+from koopcli.koopman.generator import generator_of
 from koopcli.koopman.inputs import WhiteInputs, white_inputs
 from koopcli.koopman.predictor import Predictor
 from koopcli.koopman.regression import RowBlocks, Solution, cholesky, condition_number, least_squares
@@ -24,13 +25,14 @@ HULL_BLOCK = 1 << 15  # states whose hull is taken together
 
 @dataclass(frozen=True)
 class Method:
-    """How the regression is done: with ``bilinear`` terms u_i N_i z or without, with a ``ridge`` (4.7), and whether
-    by the plain normal equations of ``cholesky``.
+    """How the regression is done: with ``bilinear`` terms u_i N_i z or without, these with the ``generator`` of the
+    step or without, with a ``ridge`` (4.7), and whether by the plain normal equations of ``cholesky``.
     """
 
     bilinear: bool = False
     ridge: float = 0.0
     cholesky: bool = False
+    generator: bool = False
 
 
 class _Operators(NamedTuple):
@@ -101,12 +103,18 @@ def fit(trajectories: Trajectories, basis: Basis, method: Method = Method(), pro
         A, B, N, rank, directions, condition = _fit_product(trajectories, trajectories.factors, basis, method, progress)
     else:
         A, B, N, rank, directions, condition = _fit_blocks(trajectories, basis, method, progress)
+    generator = None
+    if method.generator:
+        assert N is not None
+        assert basis.constant is not None, "a basis without a constant is refused by whoever chooses it"
+        generator = generator_of(A, B, N, basis.constant, trajectories.dt)
     return Predictor(
         observables=basis,
         A=A,
         B=B,
         C=basis.state_map,
         N=N,
+        generator=generator,
         dt=trajectories.dt,
         coverage=coverage(trajectories),
         state_channels=trajectories.state_channels,

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from koopcli.errors import InvalidValueError
+from koopcli.koopman import responses
 from koopcli.koopman.bases import STORED
 from koopcli.koopman.coverage import Coverage
 from koopcli.koopman.lifts import Lift, Observed
@@ -17,18 +18,18 @@ from koopcli.koopman.modes import Modes
 from koopcli.koopman.tabulated import Nearest
 from koopcli.records import Array, Channels, FloatArray, Meta, Packed
 
-SEGMENT = 128  # steps whose responses are formed together
-ROLLED = 1024  # trajectories whose lifted states are rolled together
 TABLES: dict[str, type[Nearest]] = {Nearest.kind: Nearest}  # lifts that look eigenfunctions up
 
 
 @dataclass(frozen=True)
 class Predictor:
-    """z⁺ = A z + B u, x̂ = C z with z = ψ(x): eqs. (4.1), (4.2) of docs/equations.md; a bilinear one adds Σ_i u_i N_i z.
+    """z⁺ = A z + B u, x̂ = C z with z = ψ(x): eqs. (4.1), (4.2) of docs/equations.md. A bilinear one adds Σ_i u_i N_i z
+    (4.6), or steps by its ``generator`` (4.9), of which A, B and N are then the value and the slope at u = 0.
 
-    ``A`` (N, N) as a matrix or by its rates, ``B`` (N, n_u), ``C`` (n_x, N), ``N`` the N_i (n_u, N, N) or None; ``dt``
-    in s; ``coverage``: where the training states lie; ``plant`` what was identified, as JSON; ``rank`` of
-    ``directions`` and ``condition`` of the regression; ``horizon``: the steps that it may be asked for, None for any.
+    ``A`` (N, N) as a matrix or by its rates, ``B`` (N, n_u), ``C`` (n_x, N), ``N`` the N_i (n_u, N, N) or None,
+    ``generator`` (1 + n_u, N, N) in 1/s or None; ``dt`` in s; ``coverage``: where the training states lie; ``plant``
+    what was identified, as JSON; ``rank`` of ``directions`` and ``condition`` of the regression; ``horizon``: the steps
+    that it may be asked for, None for any.
     """
 
     observables: Lift
@@ -46,6 +47,7 @@ class Predictor:
     horizon: int | None = None
     plant: Meta = field(default_factory=dict)
     N: FloatArray | None = None
+    generator: FloatArray | None = None
 
     @property
     def functions(self) -> int:
@@ -81,28 +83,36 @@ class Predictor:
             raise InvalidValueError(
                 f"x0 {x0.shape} and u {u.shape} do not fit a predictor of {n_x} states and {n_u} inputs"
             )
-        n, k = math.prod(x0.shape[:-1]), u.shape[-2]
+        shape, k = x0.shape[:-1], u.shape[-2]
+        n = math.prod(shape)
         check_horizon(k, self.horizon)
-        respond = response if self.N is None else bilinear_response
-        x = respond(self, x0.reshape(n, n_x), u.reshape(n, k, n_u))
-        return x.reshape(*x0.shape[:-1], k + 1, n_x)
+        x0, u = x0.reshape(n, n_x), u.reshape(n, k, n_u)
+        if self._advance is None:
+            x = responses.linear(self.observables, self.A, self.B, self.C, x0, u)
+        else:
+            x = responses.rolled(self.observables, self._advance, self.C, x0, u)
+        return x.reshape(*shape, k + 1, n_x)
 
     def step(self, x: FloatArray, u: FloatArray) -> FloatArray:
         """One step from the states ``x`` (n, n_x) lifted afresh, under ``u`` (n, n_u)."""
-        n_x = len(self.C)
-        onward = self._onward(x)
-        after = onward[:, :n_x] + u @ (self.C @ self.B).T
-        if self.N is not None:
-            after = after + np.einsum("ni,nij->nj", u, onward[:, n_x:].reshape(*u.shape, n_x))
-        return np.asarray(after)
+        if self._advance is None:
+            return self._onward(x) + u @ (self.C @ self.B).T
+        return np.asarray(self._advance(self.observables.lift(x), u) @ self.C.T)
 
     @cached_property
     def _onward(self) -> Observed:
-        """C A ψ(x), and behind it C N_i ψ(x) for every input of a bilinear predictor."""
-        rows = self.C @ self.A
-        if self.N is not None:
-            rows = np.concatenate([rows, *(self.C @ self.N)])
-        return self.observables.onto(rows)
+        """C A ψ(x)."""
+        return self.observables.onto(self.C @ self.A)
+
+    @cached_property
+    def _advance(self) -> responses.Advance | None:
+        """How the lifted state of a bilinear predictor moves, which has no powers of one matrix."""
+        if self.N is None:
+            return None
+        if self.generator is not None:
+            return responses.generator_step(self.generator, self.dt)
+        assert not isinstance(self.A, Modes)
+        return responses.bilinear_step(self.A, self.B, self.N)
 
     def pack(self) -> Packed:
         """The predictor for storage."""
@@ -112,7 +122,7 @@ class Predictor:
             **_pack_operator(self.A),
             "B": Array(self.B, ("lifted", "input"), ", ".join(f"1/({unit})" for unit in self.input_channels.units)),
             "C": Array(self.C, ("state", "lifted"), state),
-            **_pack_bilinear(self.N, self.input_channels),
+            **_pack_bilinear(self.N, self.generator, self.input_channels),
             **{f"coverage/{name}": array for name, array in coverage.arrays.items()},
             **{f"lift/{name}": array for name, array in observables.arrays.items()},
         }
@@ -148,6 +158,7 @@ class Predictor:
             B=arrays["B"].values[...],
             C=arrays["C"].values[...],
             N=arrays["N"].values[...] if "N" in arrays else None,
+            generator=arrays["generator"].values[...] if "generator" in arrays else None,
             dt=meta["dt"],
             coverage=Coverage.unpack(Packed(_below("coverage/", arrays))),
             state_channels=Channels.unpack(meta["state_channels"]),
@@ -181,10 +192,14 @@ def _pack_operator(A: FloatArray | Modes) -> dict[str, Array]:
     }
 
 
-def _pack_bilinear(N: FloatArray | None, inputs: Channels) -> dict[str, Array]:
-    if N is None:
-        return {}
-    return {"N": Array(N, ("input", "lifted", "lifted"), ", ".join(f"1/({unit})" for unit in inputs.units))}
+def _pack_bilinear(N: FloatArray | None, generator: FloatArray | None, inputs: Channels) -> dict[str, Array]:
+    found = {}
+    if N is not None:
+        found["N"] = Array(N, ("input", "lifted", "lifted"), ", ".join(f"1/({unit})" for unit in inputs.units))
+    if generator is not None:
+        each = ["1/s", *(f"1/(s {unit})" for unit in inputs.units)]
+        found["generator"] = Array(generator, ("none and each input", "lifted", "lifted"), ", ".join(each))
+    return found
 
 
 def _unpack_lift(packed: Packed, A: FloatArray | Modes) -> Lift:
@@ -195,64 +210,3 @@ def _unpack_lift(packed: Packed, A: FloatArray | Modes) -> Lift:
 
 def _below(prefix: str, arrays: Mapping[str, Array]) -> dict[str, Array]:
     return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
-
-
-def response(predictor: Predictor, x0: FloatArray, u: FloatArray) -> FloatArray:
-    """x̂_k = C A^k ψ(x_0) + Σ_i C A^(k-1-i) B u_i (4.3), (n, steps+1, n_x), for ``x0`` (n, n_x), ``u`` (n, steps, n_u).
-
-    Only the n_x rows of C A^k are ever formed; the lifted state is not rolled. Time goes in segments, so that memory
-    grows with the steps and not with their square.
-    """
-    n, steps, n_u = u.shape
-    n_x, N = predictor.C.shape
-    x = np.empty((n, steps + 1, n_x))
-    markov = np.empty((steps, n_x, n_u))  # C A^k B
-    rows = predictor.C  # C A^k
-    for start in range(0, steps + 1, SEGMENT):
-        stop = min(start + SEGMENT, steps + 1)
-        observed = np.empty((stop - start, n_x, N))
-        for k in range(stop - start):
-            observed[k] = rows
-            rows = rows @ predictor.A
-        x[:, start:stop] = predictor.observables.observe(x0, observed.reshape(-1, N)).reshape(n, stop - start, n_x)
-        markov[start : min(stop, steps)] = observed[: steps - start] @ predictor.B
-    for first in range(0, steps, SEGMENT):  # the inputs of one segment ...
-        inputs = u[:, first : first + SEGMENT]
-        for later in range(first, steps, SEGMENT):  # ... act on its own samples and on those of every later one
-            samples = min(SEGMENT, steps - later)
-            acting = _toeplitz(markov, later - first, inputs.shape[1], samples)
-            x[:, later + 1 : later + 1 + samples] += (inputs.reshape(n, inputs.shape[1] * n_u) @ acting).reshape(
-                n, samples, n_x
-            )
-    return x
-
-
-def bilinear_response(predictor: Predictor, x0: FloatArray, u: FloatArray) -> FloatArray:
-    """x̂_k = C z_k with z⁺ = A z + B u + Σ_i u_i N_i z (4.6), (n, steps+1, n_x), for ``x0`` and ``u`` as above.
-
-    The system that acts on z changes with the input, so z itself is rolled, for ``ROLLED`` trajectories together: one
-    matrix product for a step and all its terms.
-    """
-    assert predictor.N is not None
-    assert not isinstance(predictor.A, Modes)
-    n, steps, n_u = u.shape
-    functions = predictor.functions
-    x = np.empty((n, steps + 1, len(predictor.C)))
-    every = np.concatenate([predictor.A, *predictor.N]).T  # z -> [A z, N_1 z, …]
-    for start in range(0, n, ROLLED):
-        rows = slice(start, start + ROLLED)
-        z = predictor.observables.lift(x0[rows])
-        x[rows, 0] = z @ predictor.C.T
-        for k in range(steps):
-            terms = (z @ every).reshape(len(z), 1 + n_u, functions)
-            acting = u[rows, k]
-            z = terms[:, 0] + np.einsum("ni,nif->nf", acting, terms[:, 1:]) + acting @ predictor.B.T
-            x[rows, k + 1] = z @ predictor.C.T
-    return x
-
-
-def _toeplitz(markov: FloatArray, delay: int, inputs: int, samples: int) -> FloatArray:
-    """What input i of a segment adds to sample j + 1 of one ``delay`` steps later, (inputs · n_u, samples · n_x)."""
-    lag = delay + np.arange(samples) - np.arange(inputs)[:, np.newaxis]
-    block = np.where((lag >= 0)[..., np.newaxis, np.newaxis], markov[np.maximum(lag, 0)], 0.0)
-    return block.transpose(0, 3, 1, 2).reshape(inputs * markov.shape[2], samples * markov.shape[1])

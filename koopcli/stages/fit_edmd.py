@@ -26,7 +26,7 @@ def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
     plain = settings.solver == "cholesky-monomials"
     basis = edmd.basis_from_data(trajectories, _choice(settings))
     _warn_of_centres(basis, trajectories, context)
-    method = edmd.Method(settings.terms == "bilinear", settings.ridge, plain)
+    method = edmd.Method(settings.terms != "linear", settings.ridge, plain, settings.terms == "generator")
     predictor = edmd.fit(trajectories, basis, method, context.progress)
     if predictor.rank < predictor.directions:
         because = edmd.why_deficient(trajectories, predictor)
@@ -81,7 +81,7 @@ def _functions(task: Task) -> int:
 def _terms(task: Task) -> int:
     """Coefficients of each lifted state."""
     n_u = len(PLANTS[_plant(task)].inputs)
-    return _functions(task) * (1 + n_u) if task.settings.terms == "bilinear" else _functions(task) + n_u
+    return _functions(task) * (1 + n_u) if task.settings.terms != "linear" else _functions(task) + n_u
 
 
 def _plant(task: Task) -> str:
@@ -96,8 +96,8 @@ def _prospect(task: Task) -> Prospect:
         drawn = sample.settings
         about = f"{drawn.draw} {drawn.seed}" if isinstance(drawn, GridSample) else drawn.kind
     name = NAMES[settings.basis].format(**vars(settings))
-    if settings.terms == "bilinear":
-        name = f"bilinear {name}"
+    if settings.terms != "linear":
+        name = f"{'bilinear' if settings.terms == 'bilinear' else 'bilinear generator,'} {name}"
     order = settings.order if "order" in OF_BASIS[settings.basis] else None
     return Prospect(_functions(task), None, name, about, order)
 
@@ -131,6 +131,8 @@ def _check(task: Task) -> None:
                 "the solver 'cholesky-monomials' shows the plain regression, without 'fit-edmd.ridge': "
                 "use the solver 'orthonormal'"
             )
+    if settings.terms == "generator" and settings.basis == "states":
+        raise InvalidValueError("the terms 'generator' need a constant, which the basis 'states' has not: use 'total'")
     sample = task.find("sample")
     if sample is not None and isinstance(sample.settings, GridSample):
         _check_grid(task, sample.settings)

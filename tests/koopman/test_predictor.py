@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from koopcli.errors import InvalidValueError
-from koopcli.koopman import edmd
-from koopcli.koopman import predictor as module
+from koopcli.koopman import edmd, responses
 from koopcli.koopman.bases import Choice
 from koopcli.koopman.predictor import Predictor
 from tests.conftest import grid_sample, trajectories_of
@@ -36,7 +35,7 @@ def test_the_fast_prediction_equals_the_rolled_one(predictor, start):
 @pytest.mark.parametrize("segment", [1, 5, 12, 13])
 def test_the_length_of_a_segment_does_not_matter(predictor, start, segment, monkeypatch):
     whole = predictor.predict(*start)
-    monkeypatch.setattr(module, "SEGMENT", segment)
+    monkeypatch.setattr(responses, "SEGMENT", segment)
     assert predictor.predict(*start) == pytest.approx(whole, rel=1e-10, abs=1e-10)
 
 

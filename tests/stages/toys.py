@@ -223,6 +223,7 @@ TOYS = {
         (FitEdmd(basis="anisotropic", order=2, terms="bilinear", ridge=1e-3), {"trajectories": _trajectories(1)}),
         (FitEdmd(basis="total", order=2, terms="bilinear"), {"trajectories": _trajectories(3)}),
         (FitEdmd(basis="thin-plate", centres=5, placement="drawn", seed=2), {"trajectories": _trajectories(1)}),
+        (FitEdmd(basis="total", order=1, terms="generator"), {"trajectories": _trajectories(1)}),
         (FitEdmd(order=1, solver="cholesky-monomials"), {"trajectories": _trajectories(1)}),
     ],
     "fit-eigen": [
