@@ -29,6 +29,7 @@ count = 25
 steps = 30
 [fit-edmd]
 order = 2
+centres = 20
 [fit-eigen]
 centres = 20
 tabulate = 0.2
@@ -42,6 +43,9 @@ steps = 5
 chunk = 10
 [reproduce]
 orders = [1, 2]
+draw_seeds = [0]
+training_forces = [1e4]
+full_draws = 2
 excitations = ["none", "fresh"]
 seeds = [0, 1]
 cuts = [1e-8]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -62,12 +62,14 @@ class Invocation:
         *,
         as_json: bool,
         dry_run: bool,
-        extra: Callable[[Artefact], None] | None = None,
+        extra: Callable[[Artefact], Mapping[str, Any] | None] | None = None,
         reads: Sequence[str] = (),
+        also: Sequence[Task] = (),
     ) -> None:
         """Make ``task`` and print its name, or print the plan.
 
-        ``reads``: settings that matter beside those of the stages.
+        ``extra`` does the rest with the artefact and may return more for its JSON, ``also``: what it makes; ``reads``:
+        settings that matter beside those of the stages.
         """
         from koopcli.stages.effects import why_idle
 
@@ -75,14 +77,16 @@ class Invocation:
             if idle := why_idle(name, self.experiment, [task], reads):
                 raise UsageError(f"{name} changes nothing here: {idle}")
         if dry_run:
-            show_plan(self.pipeline.plan(task), as_json=as_json)
+            steps = {step.task: step for one in (task, *also) for step in self.pipeline.plan(one)}
+            show_plan(list(steps.values()), as_json=as_json)
             return
+        for one in also:
+            self.pipeline.check(one)
         self.console.note(f"store: {self.pipeline.store.root}")
         artefact = self.pipeline.make(task)
-        if extra is not None:
-            extra(artefact)
+        more = extra(artefact) if extra is not None else None
         if as_json:
-            print_json(describe(artefact, self.pipeline.store.path(artefact.record)))
+            print_json({**describe(artefact, self.pipeline.store.path(artefact.record)), **(more or {})})
         else:
             print(artefact.record.name)
 

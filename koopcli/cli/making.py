@@ -1,4 +1,4 @@
-"""The commands that make data and scores: sample, simulate, evaluate."""
+"""The commands that make data: sample, simulate."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from koopcli.cli import fitting
+from koopcli.cli import evaluating, fitting
 from koopcli.cli.invocation import begin
 from koopcli.cli.options import (
     DryRunOption,
@@ -35,7 +35,6 @@ from koopcli.config.settings import ForcePer, Simulate
 
 SAMPLE = ("sample", "vehicle")
 SIMULATE = fitting.DATA
-TEST = ("test", "evaluate")
 
 
 def sample(
@@ -153,59 +152,9 @@ def simulate(
     call.run(recipes.simulation(call.experiment, of), as_json=as_json, dry_run=dry_run)
 
 
-def evaluate(
-    predictor: Annotated[
-        str | None,
-        typer.Argument(autocompletion=complete_name, help="A predictor; fit-edmd makes one when left out."),
-    ] = None,
-    on: Annotated[
-        str | None,
-        typer.Option(autocompletion=complete_name, metavar="TRAJECTORIES", help="Test on these trajectories."),
-    ] = None,
-    excitation: Annotated[
-        Excitation | None,
-        typer.Option(metavar=names(Excitation), help=f"forces: inputs of the test set ({BoxSample.excitation})."),
-    ] = None,
-    amplitude: Annotated[
-        float | None, typer.Option(help=f"forces: test inputs within ± amplitude, in N ({BoxSample.amplitude:g}).")
-    ] = None,
-    count: Annotated[
-        int | None, typer.Option(help=f"Test trajectories (forces: {BoxSample.count}, slips: {BallSample.count}).")
-    ] = None,
-    steps: Annotated[
-        int | None, typer.Option(help=f"Steps of each (forces: {BoxSample.steps}, slips: {BallSample.steps}).")
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help=f"Seed of the test set (forces: {BoxSample.seed}, slips: {BallSample.seed}).")
-    ] = None,
-    set_: SetOption = None,
-    experiment: ExperimentOption = "paper",
-    store: StoreOption = None,
-    dry_run: DryRunOption = False,
-    as_json: JsonOption = False,
-) -> None:
-    """Score a predictor on test trajectories of its own plant and vehicle: RMSE, re-lifted RMSE, largest errors.
-
-    The plant names the test set: a box of states with inputs for forces, the states inside Γ without inputs for slips.
-    An interrupted evaluation goes on where it stopped.
-
-    Example: koop evaluate fit-edmd/3f2a --excitation held
-    """
-    given: Values = {"excitation": excitation, "amplitude": amplitude, "count": count, "steps": steps, "seed": seed}
-    call = begin(store, experiment, set_, (*SIMULATE, "fit-edmd", *TEST), {"test": given})
-    from koopcli.stages import recipes
-
-    of = call.named(predictor, recipes.FITS, "the PREDICTOR", TEST) if predictor else None
-    elsewhere = [section for section in call.changes if section != "test"]
-    test = call.named(on, ["simulate"], "--on", elsewhere) if on else None
-    if of is not None and test is None:
-        test = recipes.test_set(call.experiment, call.simulated(of))
-    call.run(recipes.evaluation(call.experiment, of, test), as_json=as_json, dry_run=dry_run)
-
-
 def register(app: typer.Typer) -> None:
     """Add the commands of this file."""
     app.command("sample", rich_help_panel="Make")(sample)
     app.command("simulate", rich_help_panel="Make")(simulate)
     fitting.register(app)
-    app.command("evaluate", rich_help_panel="Make")(evaluate)
+    evaluating.register(app)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from koopcli.reproduction.report import Method, Run
 
 MethodName = Literal["all", "edmd", "eigen"]
-NOT_HERE = ("sample.kind", "test.kind", "simulate.plant", "baseline.kind")
+NOT_HERE = ("sample.kind", "test.kind", "simulate.plant", "baseline.kind", "evaluate.restart")
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,9 @@ def reproduce(
         ),
     ] = "all",
     smoke: Annotated[bool, typer.Option("--smoke", help="Reduced datasets, in seconds (experiment 'smoke').")] = False,
+    full: Annotated[
+        bool, typer.Option("--full", help="edmd: also the best order over 30 random training grids (many minutes).")
+    ] = False,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
@@ -61,7 +64,7 @@ def reproduce(
     if smoke and experiment != "paper":
         raise UsageError("--smoke is an experiment of its own: leave out --experiment")
     base = "smoke" if smoke else experiment
-    call = begin(store, base, set_, SECTIONS)
+    call = begin(store, base, set_, SECTIONS, {"reproduce": {"full": True if full else None}})
     from koopcli.reproduction import report
     from koopcli.reproduction.illustrations import illustrate
     from koopcli.reproduction.registry import METHODS
@@ -88,7 +91,8 @@ def _refuse(call: Invocation, chosen: Sequence[Method]) -> None:
     from koopcli.stages.effects import why_idle
 
     for name, _ in flat(call.changes):
-        if name.startswith("fit-") and (idle := why_idle(name, call.experiment, [])):
+        read = any(name in method.reads for method in chosen)
+        if not read and name.startswith("fit-") and (idle := why_idle(name, call.experiment, [])):
             raise UsageError(f"{name} changes nothing here: {idle}")
         if name in NOT_HERE:
             raise UsageError(f"reproduce has its own {name}: change it in the stages' own commands")
@@ -109,8 +113,9 @@ def _runs(call: Invocation, base: str, method: Method) -> list[Run]:
 
     plan = {section: values for section, values in call.changes.items() if section == "reproduce"}
     used = [(name, value) for name, value in flat(call.changes) if method.uses(name)]
-    swept = tuple(f"{name}={value}" for name, value in used if name.startswith("reproduce."))
-    changed = tuple(f"{name}={value}" for name, value in used if not name.startswith("reproduce."))
+    said = [f"{name}={str(value).lower() if isinstance(value, bool) else value}" for name, value in used]
+    swept = tuple(change for change in said if change.startswith("reproduce."))
+    changed = tuple(change for change in said if not change.startswith("reproduce."))
     runs = [Run("here", load_experiment(base, plan), (), base, swept)]
     if changed:
         runs.append(Run(" ".join(changed), load_experiment(base, nested(used)), (), base, (*swept, *changed)))

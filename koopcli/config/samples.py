@@ -9,6 +9,7 @@ from koopcli.checks import setting
 
 Kind = Literal["grid", "box", "point", "ellipsoid", "ball"]
 Draw = Literal["random", "even", "chebyshev"]
+Layout = Literal["uniform", "product"]
 Mesh = Literal["sphere", "fibonacci"]
 Excitation = Literal["none", "fresh", "held"]
 PlantName = Literal["forces", "slips"]
@@ -90,6 +91,7 @@ class BoxSample(Sampled):
     amplitude: float = setting(1e4, low=0, high=LARGEST, unit="N", help="inputs are uniform in ± amplitude")
     steps: int = setting(30, low=1, high=1_000_000, help="steps of each trajectory")
     box: tuple[float, ...] = setting(BOX, low=1e-6, high=LARGEST, help="half-width per state: m/s, m/s, rad/s")
+    layout: Layout = setting("uniform", help="states uniform in the box, or the product of values drawn per state")
 
     @property
     def input_steps(self) -> int | None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from koopcli.checks import setting
-from koopcli.config.samples import SEED_LIMIT, Draw, Excitation, PlantName
+from koopcli.config.samples import LARGEST, SEED_LIMIT, Draw, Excitation, PlantName
 from koopcli.vehicles.parameters import MagicFormula, VehicleParameters
 
 ForcePer = Literal["axle", "wheel"]
@@ -27,6 +27,7 @@ FigureName = Literal[
     "single-track",
     "tyre",
     "orders",
+    "best-order",
     "random-input",
     "energy-surface",
     "error-map",
@@ -150,6 +151,9 @@ class Evaluate:
         None, low=0, high=1_000_000, help="first scored sample; else 1 for the plant 'forces' and 0 for 'slips'"
     )
     chunk: int = setting(2048, low=1, high=100_000_000, help="trajectories for each committed part")
+    restart: int | None = setting(
+        None, low=1, high=1_000_000, help="steps until a prediction starts afresh from the true state; else never"
+    )
 
 
 @dataclass(frozen=True)
@@ -196,6 +200,14 @@ class Reproduce:
 
     orders: tuple[int, ...] = setting(tuple(range(1, 11)), low=1, high=1000, unique=True, help="edmd: basis orders")
     draws: tuple[Draw, ...] = setting(("random", "even"), unique=True, help="edmd: kinds of training grid")
+    draw_seeds: tuple[int, ...] = setting(
+        (0, 1, 2), low=0, high=SEED_LIMIT, unique=True, help="edmd: seeds of the random training grids"
+    )
+    training_forces: tuple[float, ...] = setting(
+        (1.0, 100.0, 1e3, 1e4), low=0, high=LARGEST, unique=True, unit="N", help="edmd: sizes of training forces"
+    )
+    full: bool = setting(False, help="edmd: also the best order over many random training grids")
+    full_draws: int = setting(30, low=1, high=100_000, help="edmd: how many, with seeds from 0")
     excitations: tuple[Excitation, ...] = setting(("none", "fresh", "held"), unique=True, help="edmd: test inputs")
     seeds: tuple[int, ...] = setting((0, 1, 2, 3), low=0, high=SEED_LIMIT, unique=True, help="eigen: test seeds")
     cuts: tuple[float, ...] = setting(

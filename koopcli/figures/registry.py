@@ -53,6 +53,13 @@ FIGURES: dict[str, FigureKind] = {
         "orders",
         draws="points",
     ),
+    "best-order": FigureKind(
+        "how often each order is the best, over training draws",
+        "evaluation",
+        ("evaluation",),
+        "draws",
+        draws="points",
+    ),
     "random-input": FigureKind(
         "one trajectory under random inputs, true and predicted, with restarts",
         "predictor",

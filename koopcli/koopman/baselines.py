@@ -12,13 +12,13 @@ from koopcli.records import Channels, FloatArray, Meta, Packed
 from koopcli.vehicles.plants import remembered_plant
 
 TERMS = 15  # with a norm of at most ½ the next one is 1e-17
-DIFFERENCE = 1e-5  # m/s or rad/s, of the central differences behind a Jacobian
+DIFFERENCE = 1e-5  # in units of the state or input, of the central differences behind a Jacobian
 
 
 @dataclass(frozen=True)
 class Forecast:
     """``hold`` keeps the first state, ``rotation`` turns the velocity at a constant yaw rate (8.1), ``linearisation``
-    follows ẋ = f(x0) + J (x - x0) (8.2).
+    follows ẋ = f(x0, 0) + J (x - x0) + J_u u (8.2).
 
     Scored like a predictor: ``dt`` in s, ``coverage`` of the trajectories it is set beside, ``plant`` as JSON.
     """
@@ -31,14 +31,18 @@ class Forecast:
     plant: Meta
 
     functions = 0
-    knows_inputs = False
+
+    @property
+    def knows_inputs(self) -> bool:
+        """Whether inputs move the prediction at all."""
+        return self.kind == "linearisation"
 
     def predict(self, x0: FloatArray, u: FloatArray) -> FloatArray:
-        """States (n, steps+1, n_x) from ``x0`` (n, n_x); of ``u`` (n, steps, n_u) only the number of steps counts."""
-        return FORECASTS[self.kind](self, x0, u.shape[1])
+        """States (n, steps+1, n_x) from ``x0`` (n, n_x) under ``u`` (n, steps, n_u)."""
+        return FORECASTS[self.kind](self, x0, u)
 
     def step(self, x: FloatArray, u: FloatArray) -> FloatArray:
-        """One step from ``x`` (n, n_x), whatever ``u`` (n, n_u)."""
+        """One step from ``x`` (n, n_x) under ``u`` (n, n_u)."""
         return self.predict(x, u[:, np.newaxis])[:, 1]
 
     def pack(self) -> Packed:
@@ -66,39 +70,42 @@ class Forecast:
         )
 
 
-def hold(about: Forecast, x0: FloatArray, steps: int) -> FloatArray:
+def hold(about: Forecast, x0: FloatArray, u: FloatArray) -> FloatArray:
     """The first state, for ever."""
-    return np.repeat(x0[:, np.newaxis], steps + 1, axis=1)
+    return np.repeat(x0[:, np.newaxis], u.shape[1] + 1, axis=1)
 
 
-def rotation(about: Forecast, x0: FloatArray, steps: int) -> FloatArray:
+def rotation(about: Forecast, x0: FloatArray, u: FloatArray) -> FloatArray:
     """The velocity kept in the world and the yaw rate kept: in body axes it turns backwards (8.1)."""
-    turned = -x0[:, 2, np.newaxis] * about.dt * np.arange(steps + 1)
-    x = hold(about, x0, steps)
+    x = hold(about, x0, u)
+    turned = -x0[:, 2, np.newaxis] * about.dt * np.arange(x.shape[1])
     x[:, :, 0] = np.cos(turned) * x0[:, :1] - np.sin(turned) * x0[:, 1:2]
     x[:, :, 1] = np.sin(turned) * x0[:, :1] + np.cos(turned) * x0[:, 1:2]
     return x
 
 
-def linearisation(about: Forecast, x0: FloatArray, steps: int) -> FloatArray:
-    """The plant linearised at each x0, one exact step of dt after the other (8.2)."""
+def linearisation(about: Forecast, x0: FloatArray, u: FloatArray) -> FloatArray:
+    """The plant linearised at each x0 without input, one exact step of dt after the other (8.2)."""
     plant = remembered_plant(about.plant)
-    n, n_x = x0.shape
-
-    def flow(x: FloatArray) -> FloatArray:
-        return plant.rhs(x, np.zeros((len(x), len(plant.inputs))))
-
-    generator = np.zeros((n, n_x + 1, n_x + 1))
-    generator[:, :n_x, n_x] = flow(x0)
+    (n, n_x), steps, n_u = x0.shape, u.shape[1], u.shape[2]
+    none = np.zeros((n, n_u))
+    generator = np.zeros((n, n_x + 1 + n_u, n_x + 1 + n_u))  # of what is away from x0, of a one, and of held inputs
+    generator[:, :n_x, n_x] = plant.rhs(x0, none)
     for i in range(n_x):
         difference = DIFFERENCE * np.eye(n_x)[i]
-        generator[:, :n_x, i] = (flow(x0 + difference) - flow(x0 - difference)) / (2 * DIFFERENCE)
-    forward = _exponential(generator * about.dt)
-    away = np.zeros((n, steps + 1, n_x + 1))
-    away[:, 0, n_x] = 1.0
+        generator[:, :n_x, i] = (plant.rhs(x0 + difference, none) - plant.rhs(x0 - difference, none)) / (2 * DIFFERENCE)
+    for i in range(n_u):
+        difference = none + DIFFERENCE * np.eye(n_u)[i]
+        slope = (plant.rhs(x0, difference) - plant.rhs(x0, -difference)) / (2 * DIFFERENCE)
+        generator[:, :n_x, n_x + 1 + i] = slope
+    forward = _exponential(generator * about.dt)[:, :n_x]
+    x, now = hold(about, x0, u), np.ones((n, n_x + 1 + n_u))
+    now[:, :n_x] = 0.0
     for k in range(steps):
-        away[:, k + 1] = np.matmul(forward, away[:, k, :, np.newaxis])[:, :, 0]
-    return np.asarray(x0[:, np.newaxis] + away[:, :, :n_x])
+        now[:, n_x + 1 :] = u[:, k]
+        now[:, :n_x] = np.matmul(forward, now[:, :, np.newaxis])[:, :, 0]
+        x[:, k + 1] += now[:, :n_x]
+    return x
 
 
 def _exponential(M: FloatArray) -> FloatArray:

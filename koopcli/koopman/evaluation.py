@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import metrics
 from koopcli.koopman.coverage import Coverage
+from koopcli.koopman.modes import IndexArray
 from koopcli.records import Array, BoolArray, Channels, FloatArray, Meta, Packed, Trajectories
 
 
@@ -55,7 +56,8 @@ class Evaluation:
     the share of true samples inside the training box; ``distance`` (n,) of x0 to the training states in half-widths
     of that box, ``outside`` (n,) whether x0 lies outside their convex hull; ``diverged`` and ``diverged_relift`` (n,)
     of the two kinds of prediction; ``x0`` (n, n_x). A diverged prediction keeps its row and stays out of the figures
-    of its kind.
+    of its kind. With predictions that ``restart`` every so many steps each has a row, and ``start`` (n,) is the sample
+    it starts from; ``steps`` is then the longest of them.
     """
 
     x0: FloatArray
@@ -69,23 +71,28 @@ class Evaluation:
     outside: BoolArray
     diverged: BoolArray
     diverged_relift: BoolArray
+    start: IndexArray
     steps: int
     first: int
     functions: int
     state_channels: Channels
+    restart: int | None = None
 
     def figures(self) -> Meta:
         """The figures that scripts read (`--json`)."""
         valid = ~self.diverged
+        inside = valid & (self.in_domain == 1)
         with np.errstate(invalid="ignore"):
             worst = [float(np.max(e[valid], initial=0.0)) for e in self.max_error.T]
         return {
             "rmse": metrics.summary(self.rmse[valid]),
             "rmse_printed": metrics.summary(self.rmse_printed[valid]),
             "rmse_relift": metrics.summary(self.rmse_relift[~self.diverged_relift]),
+            "rmse_in_domain": metrics.summary(self.rmse[inside]),
             "start_error": metrics.summary(self.start_error[valid]),
             "max_error": dict(zip(self.state_channels.names, worst, strict=True)),
-            "trajectories": len(self.rmse),
+            "trajectories": int((self.start == 0).sum()),
+            "trajectories_in_domain": int((self.in_domain == 1).sum()),
             "steps": self.steps,
             "diverged": int(self.diverged.sum()),
             "diverged_relift": int(self.diverged_relift.sum()),
@@ -94,7 +101,16 @@ class Evaluation:
             "outside": int(self.outside.sum()),
             "worst_in_emptiest": metrics.overlap_of_largest(self.rmse[valid], self.distance[valid]),
             "functions": self.functions,
+            **({} if self.restart is None else {"restart": self.restart, "segments": self._segments()}),
         }
+
+    def _segments(self) -> list[Meta]:
+        """The mean RMSE of the predictions that start from each sample."""
+        found = []
+        for k in np.unique(self.start).tolist():
+            rows = (self.start == k) & ~self.diverged
+            found.append({"start": k, "rmse": metrics.summary(self.rmse[rows])["mean"]})
+        return found
 
     def table(self) -> tuple[list[str], list[list[float]]]:
         """The per-trajectory table: column names with units, and rows."""
@@ -103,9 +119,11 @@ class Evaluation:
         header += ["rmse (%)", "rmse_printed (%)", "rmse_relift (%)", "start_error (%)"]
         header += [f"max_error {name} ({unit})" for name, unit in states]
         header += ["in_domain (1)", "distance (half-widths)", "outside (1)", "diverged (1)", "diverged_relift (1)"]
-        columns = [self.x0, self.rmse, self.rmse_printed, self.rmse_relift, self.start_error, self.max_error]
-        columns += [self.in_domain, self.distance]
-        return header, np.column_stack([*columns, self.outside, self.diverged, self.diverged_relift]).tolist()
+        columns: list[Any] = [self.x0, self.rmse, self.rmse_printed, self.rmse_relift, self.start_error, self.max_error]
+        columns += [self.in_domain, self.distance, self.outside, self.diverged, self.diverged_relift]
+        if self.restart is not None:
+            header, columns = ["start (samples)", *header], [self.start, *columns]
+        return header, np.column_stack(columns).tolist()
 
     def pack(self) -> Packed:
         """The evaluation for storage."""
@@ -123,11 +141,13 @@ class Evaluation:
             "outside": Array(self.outside, row, "1"),
             "diverged": Array(self.diverged, row, "1"),
             "diverged_relift": Array(self.diverged_relift, row, "1"),
+            "start": Array(self.start, row, "samples"),
         }
         meta = {
             "steps": self.steps,
             "first": self.first,
             "functions": self.functions,
+            "restart": self.restart,
             "state_channels": self.state_channels.pack(),
         }
         return Packed(arrays, meta)
@@ -140,20 +160,33 @@ class Evaluation:
         return cls(**{n: a.values[...] for n, a in packed.arrays.items()}, **meta, state_channels=channels)
 
 
-def evaluate(predictor: Forecaster, trajectories: Trajectories, rows: slice, first: int) -> Evaluation:
+def evaluate(
+    predictor: Forecaster, trajectories: Trajectories, rows: slice, first: int, restart: int | None = None
+) -> Evaluation:
     """Score ``predictor`` on the trajectories ``rows``, samples k = ``first`` .. steps.
 
-    Raises ``InvalidValueError`` when states, inputs or sampling period differ from the predictor's.
+    With ``restart`` a prediction starts afresh from the true state every so many steps, and each is scored from the
+    ``first`` sample after its start; rows run by trajectory, then by start. Raises ``InvalidValueError`` when states,
+    inputs or sampling period differ from the predictor's.
     """
-    _check(predictor, trajectories, first)
+    _check(predictor, trajectories, first, restart)
+    x, u = np.asarray(trajectories.x[rows]), np.asarray(trajectories.u[rows])
+    every = restart or trajectories.steps
+    starts = range(0, trajectories.steps, every)
+    parts = [_score(predictor, x[:, k : k + every + 1], u[:, k : k + every], first, k) for k in starts]
+    order = np.argsort(np.tile(np.arange(len(x)), len(parts)), kind="stable")
+    steps = min(every, trajectories.steps)
+    return replace(_reordered(join(parts), order), restart=restart, steps=steps)
+
+
+def _score(predictor: Forecaster, x: FloatArray, u: FloatArray, first: int, start: int) -> Evaluation:
+    """The scores of one prediction for each of ``x`` (n, steps+1, n_x) under ``u`` (n, steps, n_u)."""
     domain = predictor.coverage.domain
-    x = np.asarray(trajectories.x[rows])
-    u = np.asarray(trajectories.u[rows])
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging prediction is a result, not an accident
         once = predictor.predict(x[:, 0], u)
         relift = np.empty_like(once)
         relift[:, 0], at = once[:, 0], x[:, 0]  # the first step starts from the state that is known
-        for k in range(trajectories.steps):
+        for k in range(u.shape[1]):
             relift[:, k + 1] = at = predictor.step(at, u[:, k])
         scored = slice(first, None)
         return Evaluation(
@@ -168,7 +201,8 @@ def evaluate(predictor: Forecaster, trajectories: Trajectories, rows: slice, fir
             outside=predictor.coverage.outside(x[:, 0]),
             diverged=metrics.diverged(once[:, scored], domain),
             diverged_relift=metrics.diverged(relift[:, scored], domain),
-            steps=trajectories.steps,
+            start=np.full(len(x), start),
+            steps=u.shape[1],
             first=first,
             functions=predictor.functions,
             state_channels=predictor.state_channels,
@@ -185,7 +219,16 @@ def join(parts: Sequence[Evaluation]) -> Evaluation:
     return replace(parts[0], **rows)  # type: ignore[arg-type]  # mypy does not pair names with types here
 
 
-def _check(predictor: Forecaster, trajectories: Trajectories, first: int) -> None:
+def _reordered(evaluation: Evaluation, order: IndexArray) -> Evaluation:
+    rows = {
+        field.name: getattr(evaluation, field.name)[order]
+        for field in fields(Evaluation)
+        if isinstance(getattr(evaluation, field.name), np.ndarray)
+    }
+    return replace(evaluation, **rows)
+
+
+def _check(predictor: Forecaster, trajectories: Trajectories, first: int, restart: int | None) -> None:
     if (predictor.state_channels, predictor.input_channels) != (
         trajectories.state_channels,
         trajectories.input_channels,
@@ -195,5 +238,11 @@ def _check(predictor: Forecaster, trajectories: Trajectories, first: int) -> Non
         raise InvalidValueError(
             f"the predictor steps by {predictor.dt} s, the trajectories by {trajectories.dt} s: simulate with --dt"
         )
-    if not 0 <= first <= trajectories.steps:
-        raise InvalidValueError(f"'evaluate.first' must be at most {trajectories.steps} steps, got {first}")
+    shortest = shortest_prediction(trajectories.steps, restart)
+    if not 0 <= first <= shortest:
+        raise InvalidValueError(f"'evaluate.first' must be at most {shortest} steps, got {first}")
+
+
+def shortest_prediction(steps: int, restart: int | None) -> int:
+    """Steps of the shortest prediction of a trajectory of ``steps``: the last one's, if they do not come out even."""
+    return steps if restart is None or restart >= steps else steps % restart or restart

@@ -74,6 +74,8 @@ class Method:
     """Settings that the method sweeps over or fixes, and what to write instead."""
     uses: Callable[[str], bool]
     """Whether a setting has an effect on the method."""
+    reads: Sequence[str] = ()
+    """Settings of fits that some of its cells have a use for, whatever the experiment's own fit has."""
 
 
 def tasks(method: Method, run: Run) -> list[Task]:

@@ -92,16 +92,49 @@ def ball(seed: int, count: int) -> FloatArray:
     return points
 
 
+def _uniform(generator: np.random.Generator, box: Sequence[float], count: int) -> FloatArray:
+    return np.asarray(generator.uniform(-1, 1, (count, len(box))) * np.asarray(box))
+
+
+def _product(generator: np.random.Generator, box: Sequence[float], count: int) -> FloatArray:
+    values = [_random(generator, half_width, values_per_state(count, len(box))) for half_width in box]
+    return np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(box))
+
+
+def values_per_state(count: int, states: int) -> int:
+    """How many values of each of ``states`` make ``count`` of them. Raises ``InvalidValueError`` where none do."""
+    side = int(np.rint(count ** (1 / states)))
+    if side**states != count:
+        raise InvalidValueError(
+            f"'test.count' {count} is not the product of equal numbers of values of {states} states, as {side**states} "
+            "is: choose such a number, or the layout 'uniform'"
+        )
+    return side
+
+
+LAYOUTS: dict[str, Callable[[np.random.Generator, Sequence[float], int], FloatArray]] = {
+    "uniform": _uniform,
+    "product": _product,
+}
+
+
 def box(
-    seed: int, box: Sequence[float], count: int, excitation: str, amplitude: float, steps: int, inputs: int
+    seed: int,
+    box: Sequence[float],
+    count: int,
+    excitation: str,
+    amplitude: float,
+    steps: int,
+    inputs: int,
+    layout: str = "uniform",
 ) -> tuple[FloatArray, FloatArray]:
-    """States uniform in a box with inputs uniform in [-amplitude, amplitude].
+    """States in a box, of one of ``LAYOUTS``, with inputs uniform in [-amplitude, amplitude].
 
     ``excitation``: ``fresh`` draws at each step, ``held`` once for each trajectory, ``none`` gives zeros. Returns
     the states (count, n_x) and the inputs (count, steps or 1, inputs).
     """
     generator = np.random.default_rng(seed)
-    states = generator.uniform(-1, 1, (count, len(box))) * np.asarray(box)
+    states = LAYOUTS[layout](generator, box, count)
     return states, excite(generator, excitation, amplitude, count, steps, inputs)
 
 

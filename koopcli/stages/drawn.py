@@ -46,8 +46,14 @@ MADE: dict[str, Made] = {
     "orders": Made(
         recipes.order_sweep,
         reads=("reproduce.orders",),
-        fixed=("fit-edmd.order", "fit-edmd.basis", "reproduce.draws", "reproduce.excitations"),
+        fixed=("fit-edmd.order", "reproduce.draw", "reproduce.excitations"),
         instead="it sweeps reproduce.orders with sample.draw and test.excitation",
+    ),
+    "draws": Made(
+        recipes.draw_sweep,
+        reads=("reproduce.orders", "reproduce.full_draws"),
+        fixed=("fit-edmd.order", "sample.seed", "sample.grid.seed", "reproduce.draw"),
+        instead="it sweeps reproduce.orders over reproduce.full_draws random grids",
     ),
     "eigen": Made(lambda experiment: [recipes.evaluation(experiment, recipes.fit_eigen(experiment))]),
     "beside": Made(
@@ -103,6 +109,11 @@ def _check(name: str, kind: FigureKind, artefacts: Sequence[Task]) -> None:
     if kind.draws == "one" and len(artefacts) > 1:
         raise InvalidValueError(f"the figure '{name}' draws one {kind.takes}, got {len(artefacts)}")
     for task in artefacts:
+        if kind.takes == "evaluation" and "trajectories" in kind.roles and task.settings.restart is not None:
+            raise InvalidValueError(
+                f"{task.name} holds predictions that restart every {task.settings.restart} steps; the figure '{name}' "
+                "draws one prediction for each trajectory: evaluate without --restart"
+            )
         if kind.kinds and task.settings.kind not in kind.kinds:
             raise UnknownNameError(
                 f"{task.name} is a sample of kind '{task.settings.kind}'; the figure '{name}' takes those of kind "
@@ -136,6 +147,8 @@ def _check_shared(name: str, one: Task, other: Task) -> None:
             f"the figure '{name}' draws predictors on one test set, but {one.name} is of {here.name} and {other.name} "
             f"of {there.name}: evaluate each predictor with --on {here.name}"
         )
+    if one.settings.restart != other.settings.restart:
+        raise InvalidValueError(f"{one.name} and {other.name} restart differently: evaluate both with one --restart")
     if one.settings.first != other.settings.first:
         raise InvalidValueError(
             f"{one.name} is scored from sample k = {one.settings.first}, {other.name} from k = "
@@ -160,7 +173,7 @@ def _series(name: str, kind: FigureKind, artefacts: Sequence[Task]) -> tuple[Ser
         if list(artefacts).count(task) > 1:
             raise InvalidValueError(f"{task.name} is named twice: name each evaluation once")
     if kind.draws == "points":
-        series = tuple(_point(name, task) for task in artefacts)
+        series = _points(name, artefacts)
     else:
         series = tuple(Series(label) for label in _names([task.input("predictor") for task in artefacts]))
     for one in series:
@@ -168,6 +181,32 @@ def _series(name: str, kind: FigureKind, artefacts: Sequence[Task]) -> tuple[Ser
             what = one.label if one.order is None else f"order {one.order}, {one.label}"
             raise InvalidValueError(f"several evaluations of {what}: name each once, and those of one experiment")
     return series
+
+
+def _points(name: str, evaluations: Sequence[Task]) -> tuple[Series, ...]:
+    """Points of curves; those of one curve differ in the order alone, or it is told apart by what else differs."""
+    points = [_point(name, task) for task in evaluations]
+    found = list(points)
+    for label in dict.fromkeys(point.label for point in points):
+        group = [i for i, point in enumerate(points) if point.label == label]
+        said = _differing([_of_a_point(evaluations[i]) for i in group])
+        for i, words in zip(group, said, strict=True):
+            found[i] = Series(", ".join([label, *words]), points[i].order)
+    return tuple(found)
+
+
+def _of_a_point(evaluation: Task) -> dict[str, Any]:
+    """Every setting that two points of one curve have in common."""
+    found = dict(_settings(evaluation.input("predictor")))
+    del found["fit-edmd.order"]
+    found |= {f"test/{name}": value for name, value in _settings(evaluation.input("trajectories"))}
+    return found | {"first": evaluation.settings.first, "restart": evaluation.settings.restart}
+
+
+def _differing(settings: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """Of each of several ``settings`` those that are not the same in all, in words, each once."""
+    names = [key for key in settings[0] if any(one.get(key) != settings[0][key] for one in settings)]
+    return [list(dict.fromkeys(f"{key.split('.')[-1]} {_short(one.get(key))}" for key in names)) for one in settings]
 
 
 def _point(name: str, evaluation: Task) -> Series:
@@ -188,11 +227,8 @@ def _names(predictors: Sequence[Task]) -> list[str]:
     found = list(names)
     for name in dict.fromkeys(names):
         group = [i for i, other in enumerate(names) if other == name]
-        settings = [dict(_settings(predictors[i])) for i in group]
-        differing = [key for key in settings[0] if any(one.get(key) != settings[0][key] for one in settings)]
-        for i, one in zip(group, settings, strict=True):
-            said = dict.fromkeys(f"{key.split('.')[-1]} {_short(one.get(key))}" for key in differing)
-            found[i] = ", ".join([name, *said])  # the vehicle's m stands in its sample and in its simulation
+        for i, words in zip(group, _differing([dict(_settings(predictors[i])) for i in group]), strict=True):
+            found[i] = ", ".join([name, *words])
     return found
 
 

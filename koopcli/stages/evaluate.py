@@ -9,7 +9,7 @@ import numpy as np
 from koopcli.checks import build
 from koopcli.config.settings import Evaluate
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.evaluation import Evaluation, evaluate, join
+from koopcli.koopman.evaluation import Evaluation, evaluate, join, shortest_prediction
 from koopcli.koopman.predictor import check_horizon
 from koopcli.records import Meta, Packed
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
@@ -23,7 +23,7 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
     first = settings.first
 
     def score(rows: slice) -> Packed:
-        return evaluate(predictor, trajectories, rows, first).pack()
+        return evaluate(predictor, trajectories, rows, first, settings.restart).pack()
 
     parts = context.chunks(len(trajectories), settings.chunk, score)
     result = join([Evaluation.unpack(part) for part in parts])
@@ -31,12 +31,17 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
     for name, what in (
         ("diverged", "predictions diverged"),
         ("diverged_relift", "re-lifted predictions diverged"),
-        ("undefined", "true trajectories are zero and have no relative error"),
+        ("undefined", "predicted stretches are zero in truth and have no relative error"),
     ):
         if figures[name]:
             context.warn(f"{figures[name]} of {n} {what}; they are left out of the figures")
     blocks = range(0, len(trajectories), settings.chunk)
-    if not predictor.knows_inputs and any(np.asarray(trajectories.u[i : i + settings.chunk]).any() for i in blocks):
+    fitted = predictor.functions > 0  # nobody takes a baseline that knows no inputs for more than it is
+    if (
+        fitted
+        and not predictor.knows_inputs
+        and any(np.asarray(trajectories.u[i : i + settings.chunk]).any() for i in blocks)
+    ):
         context.warn("the test trajectories have inputs, of which this predictor knows nothing")
     if other := _differing(predictor.plant, trajectories.plant):
         context.warn(f"the test trajectories are of another vehicle or plant than the predictor: {', '.join(other)}")
@@ -76,9 +81,12 @@ def _check(task: Task) -> None:
             "they have different states or inputs"
         )
     steps = task.input("trajectories").settings.steps
-    check_horizon(steps, prospect(task.input("predictor")).horizon)
-    if task.settings.first > steps:
-        raise InvalidValueError(f"'evaluate.first' must be at most the {steps} steps of the test set")
+    restart = task.settings.restart
+    check_horizon(min(steps, restart or steps), prospect(task.input("predictor")).horizon)
+    shortest = shortest_prediction(steps, restart)
+    if task.settings.first > shortest:
+        what = "the shortest prediction" if restart else "the test set"
+        raise InvalidValueError(f"'evaluate.first' must be at most the {shortest} steps of {what}")
     test = task.input("trajectories").find("sample")
     rows = min(task.settings.chunk, test.settings.trajectories) if test is not None else task.settings.chunk
     refuse_beyond_memory("a chunk", 24.0 * rows * prospect(task.input("predictor")).functions, "evaluate.chunk")
@@ -95,7 +103,7 @@ def _estimate(task: Task) -> Cost:
 
 STAGE = Stage(
     name="evaluate",
-    version=2,
+    version=3,
     settings=lambda values: build(Evaluate, values),
     run=_run,
     unpack=Evaluation.unpack,

@@ -97,7 +97,7 @@ def _prospect(task: Task) -> Prospect:
         about = f"{drawn.draw} {drawn.seed}" if isinstance(drawn, GridSample) else drawn.kind
     name = NAMES[settings.basis].format(**vars(settings))
     if settings.terms != "linear":
-        name = f"{'bilinear' if settings.terms == 'bilinear' else 'bilinear generator,'} {name}"
+        name = f"bilinear {name}" if settings.terms == "bilinear" else f"bilinear {name}, generator"
     order = settings.order if "order" in OF_BASIS[settings.basis] else None
     return Prospect(_functions(task), None, name, about, order)
 

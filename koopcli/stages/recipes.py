@@ -9,7 +9,7 @@ from typing import get_args
 
 from koopcli.checks import build
 from koopcli.config.experiment import Experiment
-from koopcli.config.samples import CUSTOMS, SAMPLED_FOR, SampleSettings
+from koopcli.config.samples import CUSTOMS, SAMPLED_FOR, GridSample, Kind, SampleSettings
 from koopcli.config.settings import Baseline, BaselineKind, FitEdmd, Simulate, Tyres
 from koopcli.errors import InvalidValueError
 from koopcli.records import Meta
@@ -60,10 +60,14 @@ def baseline(experiment: Experiment, of: Task | None = None) -> Task:
 def test_set(experiment: Experiment, plant: Simulate, **changed: object) -> Task:
     """Test trajectories of ``plant``, with its vehicle and period, from the experiment's test states for it.
 
+    Predictions that restart are made along the one trajectory that the paper draws, where the plant has one.
     ``changed``: settings of the test sample to replace.
     """
     assert plant.plant is not None, "settled when it was simulated"
-    settings = replace(experiment.test(CUSTOMS[plant.plant].test, plant.vehicle), **changed)  # type: ignore[arg-type]
+    kind: Kind = CUSTOMS[plant.plant].test
+    if experiment.evaluate.restart is not None and SAMPLED_FOR["point"] == plant.plant:
+        kind = "point"
+    settings = replace(experiment.test(kind, plant.vehicle), **changed)  # type: ignore[arg-type]
     return Task("simulate", replace(plant, steps=settings.horizon), (("sample", sample(settings)),))
 
 
@@ -97,6 +101,19 @@ def with_order(experiment: Experiment, order: int) -> Experiment:
 def order_sweep(experiment: Experiment) -> list[Task]:
     """One evaluation for each order of the experiment's sweep."""
     return [evaluation(with_order(experiment, order)) for order in experiment.reproduce.orders]
+
+
+def draw_sweep(experiment: Experiment) -> list[Task]:
+    """One evaluation for each order of the sweep, on each of many random training grids."""
+    grid = experiment.sample("grid")
+    if not isinstance(grid, GridSample):
+        raise InvalidValueError("training draws are those of a grid: sample.kind must be 'grid'")
+    found = []
+    for seed in range(experiment.reproduce.full_draws):
+        training = simulation(experiment, sample(replace(grid, seed=seed)))
+        fits = (fit_edmd(with_order(experiment, order), training) for order in experiment.reproduce.orders)
+        found += [evaluation(experiment, fit) for fit in fits]
+    return found
 
 
 def side_by_side(experiment: Experiment) -> list[Task]:

@@ -37,7 +37,7 @@ def _run(settings: SampleSettings, inputs: Inputs, context: Context) -> Sample:
     if isinstance(s, GridSample):
         factors, u = sampling.grid(s.seed, s.box, s.count, s.draw, s.levels, s.columns, n_u)
     elif isinstance(s, BoxSample):
-        states, u = sampling.box(s.seed, s.box, s.count, s.excitation, s.amplitude, s.steps, n_u)
+        states, u = sampling.box(s.seed, s.box, s.count, s.excitation, s.amplitude, s.steps, n_u, s.layout)
     elif isinstance(s, PointSample):
         states = np.array([s.x0])
         u = sampling.excite(np.random.default_rng(s.seed), s.excitation, s.amplitude, 1, s.steps, n_u)
@@ -57,6 +57,8 @@ def _check(task: Task) -> None:
     names = PLANTS[SAMPLED_FOR[s.kind]].states.names
     if isinstance(s, (GridSample, BoxSample)) and len(s.box) != len(names):
         raise InvalidValueError(f"'sample.box' must have one half-width for each of {', '.join(names)}, got {s.box}")
+    if isinstance(s, BoxSample) and s.layout == "product":
+        sampling.values_per_state(s.count, len(s.box))
     if isinstance(s, PointSample) and len(s.x0) != len(names):
         raise InvalidValueError(f"'test.point.x0' must have one value for each of {', '.join(names)}, got {s.x0}")
     if isinstance(s, EllipsoidSample):

@@ -58,7 +58,20 @@ def test_every_baseline_starts_exactly_steps_and_survives_storage(sliding, start
     assert one.step(x0, u[:, 0]) == pytest.approx(x[:, 1], rel=1e-12)
     again = Forecast.unpack(one.pack())
     assert (again.predict(x0, u) == x).all()
-    assert not again.knows_inputs
+    assert again.knows_inputs == (kind == "linearisation")
+    assert again.predict(x0, u + 1.0)[:, 1:] == pytest.approx(x[:, 1:]) or again.knows_inputs
+
+
+def test_linearisation_under_forces_is_right_to_second_order(plant):
+    """Forces enter the right-hand side linearly, so that halving the time divides the error by eight with them too."""
+    x0 = np.array([[20.0, 2.0, 0.5], [15.0, -3.0, 1.0], [-12.0, 4.0, 2.0]])
+    u = np.random.default_rng(5).uniform(-5e3, 5e3, (3, 2, 4))
+    errors = []
+    for dt in (4e-3, 2e-3, 1e-3):
+        truth = trajectories_of(plant, replace(box_sample(3), states=x0, inputs=u), 2, dt)
+        errors.append(np.abs(replace(forecast("linearisation", plant, "forces"), dt=dt).predict(x0, u) - truth.x).max())
+    assert 6.5 < errors[0] / errors[1] < 9.5
+    assert 6.5 < errors[1] / errors[2] < 9.5
 
 
 def test_the_exponential_of_many_matrices():

@@ -41,6 +41,43 @@ def test_relifting_is_the_rolled_one_step_predictor(pair):
     assert evaluate(predictor, test, slice(None), 1).rmse_relift == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.parametrize("restart", [4, 5, 10, 25])
+def test_predictions_that_restart_are_scored_one_by_one(pair, plant, restart):
+    """Each stretch is a trajectory of its own; the last is shorter where they do not come out even."""
+    predictor, _ = pair
+    test = trajectories_of(plant, box_sample(3), 10)
+    found = evaluate(predictor, test, slice(None), 1, restart)
+    starts = list(range(0, 10, restart))
+    assert found.start.tolist() == starts * 3
+    for i in range(3):
+        for j, k in enumerate(starts):
+            part = replace(test, x=test.x[i : i + 1, k : k + restart + 1], u=test.u[i : i + 1, k : k + restart])
+            alone = evaluate(predictor, part, slice(None), 1)
+            row = i * len(starts) + j
+            assert found.rmse[row] == pytest.approx(alone.rmse[0], rel=1e-9)
+            assert found.x0[row] == pytest.approx(test.x[i, k])
+    figures = found.figures()
+    assert figures["trajectories"] == 3
+    assert [segment["start"] for segment in figures["segments"]] == starts
+    assert figures["segments"][-1]["rmse"] == pytest.approx(found.rmse[found.start == starts[-1]].mean())
+    header, rows = found.table()
+    assert header[0] == "start (samples)"
+    assert [row[0] for row in rows] == starts * 3
+    assert (Evaluation.unpack(found.pack()).start == found.start).all()
+
+
+def test_the_score_inside_the_training_box(pair):
+    predictor, test = pair
+    found = evaluate(predictor, test, slice(None), 1)
+    inside = ((test.x[:, 1:] >= predictor.coverage.domain[0]) & (test.x[:, 1:] <= predictor.coverage.domain[1])).all(
+        axis=(1, 2)
+    )
+    figures = found.figures()
+    assert 0 < inside.sum() < len(test)
+    assert figures["trajectories_in_domain"] == inside.sum()
+    assert figures["rmse_in_domain"]["mean"] == pytest.approx(found.rmse[inside].mean())
+
+
 def test_a_diverged_prediction_is_counted_and_left_out(pair):
     predictor, test = pair
     wild = replace(predictor, A=1e6 * predictor.A)

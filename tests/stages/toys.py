@@ -108,6 +108,11 @@ def _calm() -> Trajectories:
     return Trajectories(data.x, 0 * data.u, data.dt, STATES, INPUTS)
 
 
+def _steered() -> Trajectories:
+    data = _trajectories(4)
+    return Trajectories(data.x, 1e-3 * np.asarray(data.u), data.dt, STATES, INPUTS)
+
+
 def _forecast(kind: str) -> Forecast:
     vehicle = {**vars(CAR), "lateral": vars(CAR.lateral), "longitudinal": vars(CAR.longitudinal)}
     plant = {"plant": "slips", "force_per": "axle", "v_eps": 0.1, "vehicle": vehicle}
@@ -132,6 +137,7 @@ def _evaluation() -> Evaluation:
         outside=t > 5,
         diverged=t > 8,
         diverged_relift=t > 7,
+        start=np.zeros(10, dtype=int),
         steps=4,
         first=1,
         functions=8,
@@ -244,6 +250,8 @@ TOYS = {
             (Evaluate(chunk=100, first=0), {"predictor": _forecast(kind), "trajectories": _calm()})
             for kind in ("hold", "rotation", "linearisation")
         ),
+        (Evaluate(chunk=2, first=1, restart=3), {"predictor": _bilinear(), "trajectories": _trajectories(4)}),
+        (Evaluate(chunk=100, first=0), {"predictor": _forecast("linearisation"), "trajectories": _steered()}),
     ],
     "plot": [(figure_settings(name), figure_records(name)) for name in FIGURES],
 }

@@ -1,0 +1,145 @@
+"""The command that scores, with what the scores are worth."""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from koopcli.cli import fitting
+from koopcli.cli.invocation import Invocation, begin
+from koopcli.cli.options import (
+    DryRunOption,
+    ExperimentOption,
+    JsonOption,
+    SetOption,
+    StoreOption,
+    complete_name,
+    names,
+)
+from koopcli.config.experiment import Changes, Values
+from koopcli.config.samples import BallSample, BoxSample, Excitation
+from koopcli.console import Console, show_table
+
+if TYPE_CHECKING:
+    from koopcli.stages.base import Task
+    from koopcli.stages.pipeline import Artefact
+
+
+TEST = ("test", "evaluate")
+
+
+def evaluate(
+    predictor: Annotated[
+        str | None,
+        typer.Argument(autocompletion=complete_name, help="A predictor; fit-edmd makes one when left out."),
+    ] = None,
+    on: Annotated[
+        str | None,
+        typer.Option(autocompletion=complete_name, metavar="TRAJECTORIES", help="Test on these trajectories."),
+    ] = None,
+    excitation: Annotated[
+        Excitation | None,
+        typer.Option(metavar=names(Excitation), help=f"forces: inputs of the test set ({BoxSample.excitation})."),
+    ] = None,
+    amplitude: Annotated[
+        float | None, typer.Option(help=f"forces: test inputs within ± amplitude, in N ({BoxSample.amplitude:g}).")
+    ] = None,
+    count: Annotated[
+        int | None, typer.Option(help=f"Test trajectories (forces: {BoxSample.count}, slips: {BallSample.count}).")
+    ] = None,
+    steps: Annotated[
+        int | None, typer.Option(help=f"Steps of each (forces: {BoxSample.steps}, slips: {BallSample.steps}).")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help=f"Seed of the test set (forces: {BoxSample.seed}, slips: {BallSample.seed}).")
+    ] = None,
+    restart: Annotated[
+        int | None,
+        typer.Option(
+            help="Start the prediction afresh from the true state every so many steps, and score each stretch. Of a "
+            "predictor driven by forces the test set is then the paper's trajectory under random inputs (kind point)."
+        ),
+    ] = None,
+    set_: SetOption = None,
+    experiment: ExperimentOption = "paper",
+    store: StoreOption = None,
+    dry_run: DryRunOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Score a predictor on test trajectories of its own plant and vehicle: RMSE, re-lifted RMSE, largest errors.
+
+    The plant names the test set: a box of states with inputs for forces, the states inside Γ without inputs for slips.
+    An interrupted evaluation goes on where it stopped. Beside it stand what fits nothing, the first state held and the
+    plant linearised there, and the linear predictor of the same data, with a verdict.
+
+    Example: koop evaluate fit-edmd/3f2a --excitation held
+    """
+    given: Values = {"excitation": excitation, "amplitude": amplitude, "count": count, "steps": steps, "seed": seed}
+    changes: Changes = {"test": given, "evaluate": {"restart": restart}}
+    call = begin(store, experiment, set_, (*fitting.DATA, "fit-edmd", *TEST), changes)
+    from koopcli.stages import recipes
+    from koopcli.stages.verdict import beside
+
+    of = call.named(predictor, recipes.FITS, "the PREDICTOR", TEST) if predictor else None
+    elsewhere = [section for section in call.changes if section != "test"]
+    test = call.named(on, ["simulate"], "--on", elsewhere) if on else None
+    if of is not None and test is None:
+        test = recipes.test_set(call.experiment, call.simulated(of))
+    task = recipes.evaluation(call.experiment, of, test)
+    others = beside(call.experiment, task)
+    call.run(
+        task,
+        as_json=as_json,
+        dry_run=dry_run,
+        extra=lambda artefact: _judge(call, artefact, others),
+        also=list(others.values()),
+    )
+
+
+def _judge(call: Invocation, artefact: Artefact, others: dict[str, Task]) -> dict[str, Any]:
+    """The scores of the ``others`` beside those of ``artefact``, with the verdict, as a table and as JSON."""
+    from koopcli.stages.pipeline import Pipeline
+    from koopcli.stages.verdict import NAMES, verdict
+
+    if not others:
+        call.console.note("no baselines beside it: the data that this predictor was fitted to are no longer there")
+        return {}
+    quiet = Pipeline(call.pipeline.store, _Unwarned(call.console))
+    made = {name: quiet.make(task) for name, task in others.items()}
+    rows = [["this predictor", *_scores(artefact.figures)]]
+    rows += [[NAMES[name], *_scores(one.figures)] for name, one in made.items()]
+    show_table(["RMSE in %", "mean ± std", "median", "max", "re-lifted", "in the data's box"], rows, file=sys.stderr)
+    for segment in artefact.figures.get("segments", []):
+        call.console.note(f"from sample {segment['start']:>4}: RMSE {segment['rmse']:.4g} %")
+    found = verdict(artefact.figures, {name: one.figures for name, one in made.items()})
+    (call.console.note if found.beats else call.console.warn)(found.text)
+    scores = {name: {"name": one.record.name, "rmse": one.figures["rmse"]} for name, one in made.items()}
+    return {"baselines": scores, "beats_baselines": found.beats, "verdict": found.text}
+
+
+def _scores(figures: dict[str, Any]) -> list[str]:
+    rmse = figures["rmse"]
+    others = [rmse["median"], rmse["max"], figures["rmse_relift"]["mean"], figures["rmse_in_domain"]["mean"]]
+    return [
+        f"{rmse['mean']:.4g} ± {rmse['std']:.3g}",
+        *("–" if math.isnan(value) else f"{value:.4g}" for value in others),
+    ]
+
+
+class _Unwarned:
+    """A console that keeps to itself what is wrong with a baseline, which is meant to be poor."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self.note, self.progress = console.note, console.progress
+
+    def warn(self, text: str) -> None:
+        """Nothing."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command of this file."""
+    app.command("evaluate", rich_help_panel="Make")(evaluate)

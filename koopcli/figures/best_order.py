@@ -1,0 +1,58 @@
+"""How often each order of the basis has the smallest error, over training draws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from koopcli.config.paper import BEST_ORDERS
+from koopcli.config.settings import Plot
+from koopcli.figures.colours import COLOURS, PAPER
+from koopcli.figures.drawing import Source, column
+from koopcli.figures.orders import select as by_draw
+from koopcli.figures.style import COLUMN, legend_below, style
+from koopcli.records import Array
+
+
+@dataclass(frozen=True)
+class BestOrders:
+    """Of each draw its order of the smallest mean error, among the ``orders`` (m,) that were tried."""
+
+    orders: npt.NDArray[np.int64]
+    best: npt.NDArray[np.int64]
+
+
+def select(sources: Sequence[Source], settings: Plot) -> BestOrders:
+    """What the figure shows. Raises ``InvalidValueError`` where every prediction of every evaluation diverged."""
+    curves = by_draw(sources, settings)
+    tried = np.unique(np.concatenate([curve.order for curve in curves]))
+    best = [curve.order[np.nanargmin(curve.mean)] for curve in curves if np.isfinite(curve.mean).any()]
+    return BestOrders(tried, np.array(best))
+
+
+def numbers(shown: BestOrders) -> Mapping[str, Array]:
+    """How many draws each order is the best of."""
+    counts = [float((shown.best == order).sum()) for order in shown.orders]
+    return {"order": column(shown.orders, "order", "1"), "draws": column(counts, "order", "1")}
+
+
+def draw(shown: BestOrders) -> Figure:
+    """A bar for each order; the paper's two are marked."""
+    with style():
+        figure = Figure(figsize=(COLUMN, 2.4), layout="constrained")
+        axes = figure.subplots()
+        counts = [int((shown.best == order).sum()) for order in shown.orders]
+        axes.bar(shown.orders, counts, color=COLOURS[0], width=0.7, label=f"best of {len(shown.best)} training draws")
+        there = [order for order in BEST_ORDERS if order in shown.orders]
+        axes.plot(there, [0.0] * len(there), "^", color=PAPER, clip_on=False, zorder=5, label="the paper's best orders")
+        for which in (axes.xaxis, axes.yaxis):
+            which.set_major_locator(MaxNLocator(integer=True))
+        axes.set_xlabel("order of the polynomial basis")
+        axes.set_ylabel("training draws (1)")
+        legend_below(figure)
+    return figure

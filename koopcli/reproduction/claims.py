@@ -1,0 +1,237 @@
+"""The paper's claims about EDMD, each with what was found here, a verdict from it, and the command that shows it."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
+from koopcli.config.samples import INPUTS
+from koopcli.records import Meta
+from koopcli.reproduction import edmd_cells as blocks
+from koopcli.reproduction.report import Run, Table
+
+CLEAR = 1.02  # a ratio of two mean errors from which one is called larger
+WORSE = 1.05  # the same, from the best order to the largest basis
+YAW_EXACT = {"even": 1e-9, "chebyshev": 1e-9, "random": 1e-6}  # rad/s: what rounding leaves, by training draw
+YAW_ORDERS = {"even": 10, "chebyshev": 10, "random": 7}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found of a claim, line by line, and what follows."""
+
+    here: Sequence[str]
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper: ``found`` judges it by a run, ``shows`` is the command without its experiment."""
+
+    text: str
+    paper: str
+    found: Callable[[Run], Finding | None]
+    shows: Sequence[str]
+
+
+def claims_table(run: Run) -> Table:
+    """Claim, paper, here, verdict and command."""
+    rows = []
+    for claim in CLAIMS:
+        finding = claim.found(run)
+        if finding is not None:
+            rows.append([claim.text, claim.paper, "\n".join(finding.here), finding.verdict, _command(run, claim.shows)])
+    title = "The paper's claims" if run.label == "here" else f"The paper's claims, with {run.label}"
+    return Table(title, ["claim", "paper", "here", "verdict", "command"], rows)
+
+
+def _command(run: Run, words: Sequence[str]) -> str:
+    told = [] if run.base == "paper" else ["--experiment", run.base]
+    for change in run.changes:
+        if not change.startswith("reproduce."):
+            told += ["--set", change]
+    return shlex.join(["koop", *words, *told])
+
+
+def scores(run: Run, block: str, **wanted: object) -> list[tuple[blocks.Cell, Meta]]:
+    """The cells of a block with what is ``wanted`` of their fields, and their figures."""
+    return [
+        (scored.cell, scored.figures)
+        for scored in run.scored
+        if scored.cell.block == block and all(getattr(scored.cell, name) == value for name, value in wanted.items())
+    ]
+
+
+def mean(figures: Meta) -> float:
+    """The mean error in percent; infinite where predictions diverged, which leaves them out of it."""
+    found = float(figures["rmse"]["mean"])
+    return math.inf if figures["diverged"] or math.isnan(found) else found
+
+
+def by_order(run: Run, draw: str, excitation: str, block: str = blocks.SWEEP) -> dict[int, float]:
+    """The mean error of every order on a training draw."""
+    found = scores(run, block, draw=draw, excitation=excitation)
+    return {cell.order: mean(figures) for cell, figures in found if cell.order is not None}
+
+
+def _draws(run: Run) -> list[str]:
+    return [training.name for training in blocks.trainings(run.experiment)]
+
+
+def _percent(value: float) -> str:
+    return f"{value:.3g} %" if math.isfinite(value) else "diverges"
+
+
+def _floor(run: Run) -> Finding:
+    """The best linear predictor, and the bilinear ones, on the first training draw."""
+    draw, said = _draws(run)[0], list[str]()
+    best: dict[str, float] = {}
+    for excitation in run.experiment.reproduce.excitations:
+        linear = by_order(run, draw, excitation)
+        order = min(linear, key=lambda one: linear[one])
+        text = f"{INPUTS[excitation]}: {_percent(linear[order])} (order {order})"
+        for cell, figures in scores(run, blocks.OTHERS, draw=draw, excitation=excitation):
+            if cell.label.startswith("bilinear"):
+                text += f", {_percent(mean(figures))} ({cell.label}, {figures['functions']} functions)"
+                best[excitation] = min(mean(figures), best.get(excitation, math.inf))
+        said.append(text)
+    driven = [value for excitation, value in best.items() if excitation != "none"] or list(best.values())
+    ratio = BEST_RMSE / max(driven)
+    verdict = f"does not hold: it is the floor of a constant B; bilinear terms are {ratio:.0f} times better"
+    return Finding(said, verdict)
+
+
+def _splines(run: Run) -> Finding | None:
+    """Polynomials of the paper's best order beside splines, wherever both were fitted."""
+    excitation, order = blocks.excitation(run.experiment), blocks.best_order(run.experiment)
+    said, holds = [], []
+    for cell, figures in scores(run, blocks.OTHERS, order=None, excitation=excitation):
+        polynomial, spline = by_order(run, cell.draw, excitation)[order], mean(figures)
+        said.append(f"{cell.draw}: order {order} {_percent(polynomial)}, splines {_percent(spline)}")
+        holds.append(polynomial < spline)
+    if not said:
+        return None
+    return Finding(said, _verdict(holds))
+
+
+def _best(run: Run) -> Finding | None:
+    """The order of the smallest mean on every training draw, and over many where they were tried."""
+    excitation = blocks.excitation(run.experiment)
+    if not set(BEST_ORDERS) & set(run.experiment.reproduce.orders):
+        return None
+    found = {draw: by_order(run, draw, excitation) for draw in _draws(run)}
+    best = {draw: min(means, key=lambda order: means[order]) for draw, means in found.items()}
+    here = [f"{draw}: {order} ({_percent(found[draw][order])})" for draw, order in best.items()]
+    near = [
+        draw
+        for draw, means in found.items()
+        if min((means[o] for o in BEST_ORDERS if o in means), default=math.inf) <= CLEAR * means[best[draw]]
+    ]
+    verdict = _verdict([order in BEST_ORDERS for order in best.values()])
+    verdict += f"; within 2 % of the best in {len(near)} of {len(best)}"
+    many = [cell.draw for cell, _ in scores(run, blocks.DRAWS)]
+    if many:
+        counts = Counter(
+            min(means, key=lambda order: means[order])
+            for means in (by_order(run, draw, excitation, blocks.DRAWS) for draw in dict.fromkeys(many))
+        )
+        total = sum(counts.values())
+        here.append(f"over {total} random draws: {', '.join(f'{one} in {counts[one]}' for one in sorted(counts))}")
+        verdict += f"; 6 to 8 in {sum(counts[order] for order in (6, 7, 8))} of {total}"
+    return Finding(here, verdict)
+
+
+def _larger(run: Run) -> Finding | None:
+    """The largest basis over the best, and the textbook's regression beside it."""
+    excitation = blocks.excitation(run.experiment)
+    if max(run.experiment.reproduce.orders) <= BEST_ORDERS[-1]:
+        return None
+    said, worse = [], []
+    for draw in _draws(run):
+        means = by_order(run, draw, excitation)
+        best, last = min(means.values()), max(means)
+        said.append(f"{draw}: order {last} {_percent(means[last])}, best {_percent(best)}")
+        worse.append(means[last] > WORSE * best)
+    text = _verdict(worse)
+    textbook = by_order(run, _draws(run)[0], excitation, blocks.TEXTBOOK)
+    if textbook:
+        listed = ", ".join(f"{order} {_percent(value)}" for order, value in sorted(textbook.items()))
+        said.append(f"normal equations of monomials, {_draws(run)[0]}: order {listed}")
+        if max(textbook.values()) > WORSE * min(textbook.values()):
+            text += "; the growth is that of the normal equations' rounding"
+    return Finding(said, text)
+
+
+def _forces(run: Run) -> Finding | None:
+    """The best order trained with forces of one size."""
+    kinds = [kind for kind in ("none", "fresh") if kind in run.experiment.reproduce.excitations]
+    order, said, holds = blocks.best_order(run.experiment), [], []
+    for kind in kinds:
+        both = scores(run, blocks.FORCES, excitation=kind, order=order)
+        rows = [(cell, figures) for cell, figures in both if "bilinear" not in cell.label]
+        if len(rows) < 2:
+            continue
+        means = [mean(figures) for _, figures in rows]
+        sizes = [cell.label.rpartition(", ")[2] for cell, _ in rows]
+        listed = ", ".join(f"{size} {_percent(value)}" for size, value in zip(sizes, means, strict=True))
+        said.append(f"{INPUTS[kind]}: {listed}")
+        holds.append(means[-1] > CLEAR * means[0])
+    return Finding(said, _verdict(holds)) if said else None
+
+
+def _yaw(run: Run) -> Finding | None:
+    """The largest yaw-rate error up to the order to which rounding is harmless, of each kind of draw."""
+    said, holds = [], []
+    for training in blocks.trainings(run.experiment):
+        found = [
+            (cell.order, figures["max_error"]["yaw_rate"])
+            for cell, figures in scores(run, blocks.SWEEP, draw=training.name)
+            if cell.order is not None and cell.order <= YAW_ORDERS[training.draw]
+        ]
+        if not found:
+            continue
+        error = max(value for _, value in found)
+        said.append(f"{training.name}: {error:.1e} rad/s up to order {max(order for order, _ in found)}")
+        holds.append(error <= YAW_EXACT[training.draw])
+    return Finding(said, _verdict(holds, "holds, to rounding")) if said else None
+
+
+def _verdict(holds: Sequence[bool], yes: str = "holds") -> str:
+    if all(holds):
+        return yes
+    return f"holds in {sum(holds)} of {len(holds)} cases" if any(holds) else "does not hold"
+
+
+PLAIN = ("evaluate", "--set")
+CLAIMS = (
+    Claim(
+        "an error of 11.1 % is the best there is",
+        f"{BEST_RMSE} %, test inputs not stated",
+        _floor,
+        (*PLAIN, "fit-edmd.basis=anisotropic", "--set", "fit-edmd.order=8", "--set", "fit-edmd.terms=generator"),
+    ),
+    Claim(
+        "polynomials beat thin-plate splines",
+        "said, without a figure",
+        _splines,
+        (*PLAIN, "fit-edmd.basis=thin-plate"),
+    ),
+    Claim("orders 6 and 7 are best", "6 and 7", _best, ("plot", "orders")),
+    Claim(
+        "larger bases get worse",
+        "grows exponentially",
+        _larger,
+        (*PLAIN, "fit-edmd.solver=cholesky-monomials"),
+    ),
+    Claim(
+        "small training forces beat large ones",
+        "±1 to ±100 N chosen",
+        _forces,
+        (*PLAIN, "sample.levels=[10000]", "--set", "sample.columns=60"),
+    ),
+    Claim("the yaw rate is tracked without error", "without error", _yaw, ("plot", "random-input")),
+)

@@ -1,0 +1,68 @@
+"""What a predictor's scores are worth: beside predictions that fit nothing, and beside the linear one of its data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from koopcli.config.experiment import Experiment
+from koopcli.config.settings import Baseline, FitEdmd
+from koopcli.records import Meta
+from koopcli.stages import recipes
+from koopcli.stages.base import Task
+
+LINEAR = FitEdmd(basis="total", order=1)
+NAMES = {
+    "hold": "hold the first state",
+    "linearisation": "linearisation at the first state",
+    "linear": "linear predictor",
+}
+
+
+def beside(experiment: Experiment, evaluation: Task) -> dict[str, Task]:
+    """Evaluations of what a predictor has to beat, on the same test set; none where its training data are gone."""
+    predictor = evaluation.input("predictor")
+    training = dict(predictor.inputs).get("trajectories")
+    if training is None:
+        return {}
+    others = {
+        "hold": recipes.baseline(replace(experiment, baseline=Baseline("hold")), training),
+        "linearisation": recipes.baseline(replace(experiment, baseline=Baseline("linearisation")), training),
+        "linear": recipes.fit_edmd(replace(experiment, fit_edmd=LINEAR), training),
+    }
+    trajectories = evaluation.input("trajectories")
+    return {
+        name: Task("evaluate", evaluation.settings, (("predictor", other), ("trajectories", trajectories)))
+        for name, other in others.items()
+        if (other.stage, other.settings) != (predictor.stage, predictor.settings)
+    }
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a predictor ``beats`` all it was set beside, by the mean RMSE, and that in words."""
+
+    beats: bool
+    text: str
+
+
+def verdict(figures: Meta, others: Mapping[str, Meta]) -> Verdict:
+    """The plain verdict on the ``figures`` of an evaluation beside those of ``others``."""
+    mean = _mean(figures)
+    better = [name for name, other in others.items() if not mean < _mean(other)]
+    if figures["diverged"]:
+        text = f"{figures['diverged']} of its predictions diverge, which no baseline's do"
+        return Verdict(False, f"the predictor cannot be trusted: {text}")
+    if better:
+        named = " or ".join(f"the baseline '{NAMES[name]}' ({_mean(others[name]):.4g} %)" for name in better)
+        return Verdict(False, f"the predictor, with {mean:.4g} %, does not beat {named}")
+    nearest = min(others, key=lambda name: _mean(others[name]))
+    best = f"'{NAMES[nearest]}' has {_mean(others[nearest]):.4g} %"
+    return Verdict(True, f"the predictor, with {mean:.4g} %, beats every baseline: {best}")
+
+
+def _mean(figures: Meta) -> float:
+    """The mean error, which nothing finite undercuts where none is defined."""
+    mean = float(figures["rmse"]["mean"])
+    return math.inf if math.isnan(mean) else mean
