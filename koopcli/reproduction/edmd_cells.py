@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS
 from koopcli.config.samples import BoxSample, Draw, Excitation, GridSample
-from koopcli.config.settings import BasisName, FitEdmd, ForcePer, Terms
+from koopcli.config.settings import OF_BASIS, BasisName, FitEdmd, ForcePer, Terms
 from koopcli.errors import InvalidValueError
 from koopcli.stages import recipes, verdict
 from koopcli.stages.base import Task
@@ -80,10 +80,7 @@ def best_order(experiment: Experiment) -> int:
 def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
     """Every cell of the experiment with its evaluation."""
     plan = experiment.reproduce
-    if experiment.fit_edmd.settled().order != experiment.fit_edmd.order or experiment.fit_edmd.basis in (
-        SPLINES,
-        "states",
-    ):
+    if "order" not in OF_BASIS[experiment.fit_edmd.basis]:
         raise InvalidValueError(
             f"reproduce edmd sweeps orders, which the basis '{experiment.fit_edmd.basis}' has none of: leave it out"
         )

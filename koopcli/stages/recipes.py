@@ -10,7 +10,7 @@ from typing import get_args
 from koopcli.checks import build
 from koopcli.config.experiment import Experiment
 from koopcli.config.samples import CUSTOMS, SAMPLED_FOR, GridSample, Kind, SampleSettings
-from koopcli.config.settings import Baseline, BaselineKind, FitEdmd, Simulate, Tyres
+from koopcli.config.settings import OF_BASIS, Baseline, BaselineKind, FitEdmd, Simulate, Tyres
 from koopcli.errors import InvalidValueError
 from koopcli.records import Meta
 from koopcli.stages.base import Task
@@ -99,7 +99,9 @@ def with_order(experiment: Experiment, order: int) -> Experiment:
 
 
 def order_sweep(experiment: Experiment) -> list[Task]:
-    """One evaluation for each order of the experiment's sweep."""
+    """One evaluation for each order of the experiment's sweep. Raises ``InvalidValueError`` for a basis without any."""
+    if "order" not in OF_BASIS[experiment.fit_edmd.basis]:
+        raise InvalidValueError(f"the basis '{experiment.fit_edmd.basis}' has no order to sweep: choose polynomials")
     return [evaluation(with_order(experiment, order)) for order in experiment.reproduce.orders]
 
 

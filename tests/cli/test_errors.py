@@ -169,9 +169,19 @@ def test_a_named_artefact_cannot_be_changed_after_the_fact(koop):
     one_line(koop("evaluate", "--on", "simulate", "--excitation", "held"), 2, "test.excitation cannot change it")
 
 
-def test_a_figure_does_not_mix_experiments(koop):
-    one, two = koop("evaluate").name, koop("evaluate", "--set", "vehicle.Jzz=1731").name
-    one_line(koop("plot", "orders", one, two), 3, "several evaluations of order 2", "those of one experiment")
+def test_a_figure_does_not_mix_experiments_in_one_curve(koop, folder):
+    """Points of one curve differ in the order alone; others are told apart by what else differs."""
+    made = [
+        koop("evaluate", "--set", f"fit-edmd.order={order}", "--set", f"vehicle.Jzz={inertia}").name
+        for order, inertia in ((1, 1400), (2, 1400), (1, 1731), (2, 1731))
+    ]
+    assert koop("plot", "orders", *made, "--csv", "both.csv").code == 0
+    header = (folder / "both.csv").read_text().splitlines()[0]
+    assert "random 0, fresh inputs, Jzz 1400/mean" in header
+    assert "random 0, fresh inputs, Jzz 1731/mean" in header
+    koop("plot", "orders", made[0], made[3], "--csv", "two.csv")
+    assert (folder / "two.csv").read_text().splitlines()[0].count("/mean") == 2
+    one_line(koop("plot", "orders", made[0], made[0]), 3, "is named twice")
 
 
 def test_an_ambiguous_name_lists_the_candidates(koop):

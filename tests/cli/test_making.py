@@ -92,13 +92,13 @@ def test_the_plant_of_the_predictor_makes_its_test_set(koop, folder):
 def test_dry_run_makes_nothing(koop, folder):
     told = koop("evaluate", "--dry-run")
     assert told.code == 0
-    assert told.out.count("make") == 6
+    assert told.out.count("make") == 12  # six, and six of what the predictor is set beside
     assert "total, roughly" in told.out
     assert "count=40" in told.out
     assert not (folder / "artefacts").exists()
     plan = json.loads(koop("evaluate", "--dry-run", "--json").out)
     assert plan["dry_run"]
-    assert len(plan["steps"]) == 6
+    assert len(plan["steps"]) == 12
 
 
 def test_any_setting_upstream_can_be_set(koop):
@@ -125,6 +125,7 @@ def test_ls_and_show(koop, folder):
     listed = json.loads(koop("ls", "--json").out)
     assert [row["name"].split("/")[0] for row in listed] == [
         "sample", "simulate", "fit-edmd", "sample", "simulate", "evaluate",
+        "baseline", "evaluate", "baseline", "evaluate", "fit-edmd", "evaluate",
     ]  # fmt: skip
     assert len(json.loads(koop("ls", "sample", "--json").out)) == 2
     table = koop("ls").out

@@ -108,7 +108,8 @@ def test_one_changed_assumption(koop):
     [
         ("tyre", "vehicle.Jzz=1731", "the figure 'tyre' draws nothing of it"),
         ("single-track", "vehicle.Jzz=1731", "the figure 'single-track' draws nothing of it"),
-        ("orders", "fit-edmd.basis=states", "it sweeps reproduce.orders"),
+        ("orders", "fit-edmd.order=3", "it sweeps reproduce.orders"),
+        ("best-order", "sample.seed=3", "over reproduce.full_draws random grids"),
         ("tyre", "fit-edmd.order=3", "the figure 'tyre' draws nothing of it"),
         ("tyre", "sample.seed=3", "the figure 'tyre' draws nothing of it"),
         ("single-track", "vehicle.mu_scale=0.5", "changes nothing"),

@@ -88,9 +88,9 @@ def test_two_terminals_make_one_artefact_once(folder):
     done = [process.communicate(timeout=120) for process in both]
     assert [process.returncode for process in both] == [0, 0]
     assert done[0][0] == done[1][0]
-    made = [sum("evaluate/" in line and "made in" in line for line in err.splitlines()) for _, err in done]
-    assert sum(made) == 1
-    assert read_all(folder / "artefacts") == 6
+    made = [line.split()[0] for _, err in done for line in err.splitlines() if "made in" in line]
+    assert sorted(made) == sorted(set(made))
+    assert read_all(folder / "artefacts") == len(made) == 12
 
 
 def test_bars_on_a_terminal_and_nothing_of_them_on_stdout(folder):

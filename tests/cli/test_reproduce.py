@@ -12,13 +12,22 @@ def test_the_table_the_report_and_the_pins(koop, folder):
     report = folder / done.name
     assert report.name == "report.html"
     text = report.read_text()
-    for part in ("paper", "11.1 %", "unstated inputs", "random draw", "even draw", "koop plot orders -o"):
+    for part in (
+        "paper",
+        "11.1 %",
+        "unstated inputs",
+        "random 0 draw",
+        "even draw",
+        "does not hold",
+        "koop plot orders -o",
+    ):
         assert part in text.replace("koop plot orders --experiment ../tiny.toml -o", "koop plot orders -o")
     assert "EDMD: paper versus here" in done.err
     assert "No parameter was chosen" in done.err
     for name in re.findall(r"evaluate/[0-9a-f]{12}", text):
         assert koop("path", name).code == 0
-    assert len(set(re.findall(r"evaluate/[0-9a-f]{12}", text))) == 2 * 2 * 2
+    sweep, others, baselines, forces, more, drawn = 2 * 2 * 2, 2 * 3 * 2, 3 * 2, 2 * 2, 2 * 2, 3
+    assert len(set(re.findall(r"evaluate/[0-9a-f]{12}", text))) == sweep + others + baselines + forces + more + drawn
     label = f"reproduce-{report.parent.name}"
     rows = json.loads(koop("ls", "--json").out)
     assert {tuple(row["pins"]) for row in rows} == {(label,)}
@@ -41,8 +50,10 @@ def test_one_changed_assumption_beside_the_unmodified_run(koop, folder):
     assert [run["run"] for run in both["runs"]] == ["here", "vehicle.Jzz=1731"]
     assert both["runs"][0]["evaluations"] == json.loads(plain.out)["runs"][0]["evaluations"]
     here, changed = (run["evaluations"] for run in both["runs"])
-    assert len(here) == len(changed) == 8
-    assert all(a["rmse"] != b["rmse"] for a, b in zip(here, changed, strict=True))
+    assert len(here) == len(changed) == 37
+    free = [a["label"] == "hold the first state" for a in here]
+    assert all(a["rmse"] != b["rmse"] for a, b in zip(here, changed, strict=True) if a["order"])
+    assert sum(free) == 2
     text = (folder / both["path"]).read_text()
     assert "<em>With vehicle.Jzz=1731.</em>" in text
     amplitude = koop("reproduce", "edmd", "--set", "test.amplitude=50")
@@ -51,7 +62,11 @@ def test_one_changed_assumption_beside_the_unmodified_run(koop, folder):
 
 def test_the_figures_of_the_report_are_those_of_evaluate(koop):
     runs = json.loads(koop("reproduce", "edmd", "--json").out)["runs"]
-    (cell,) = [c for c in runs[0]["evaluations"] if (c["draw"], c["order"], c["excitation"]) == ("even", 2, "none")]
+    (cell,) = [
+        c
+        for c in runs[0]["evaluations"]
+        if (c["block"], c["draw"], c["order"], c["excitation"]) == ("sweep", "even", 2, "none")
+    ]
     alone = koop("evaluate", "--json", "--set", "sample.draw=even", "--excitation", "none", "--set", "fit-edmd.order=2")
     assert json.loads(alone.out)["rmse"] == cell["rmse"]
     assert json.loads(alone.out)["name"] == cell["name"]
@@ -75,10 +90,13 @@ def test_an_impossible_sweep_is_refused_before_anything_is_made(koop, folder):
 
 def test_dry_run_and_smoke(koop, folder):
     plan = json.loads(koop("reproduce", "edmd", "--smoke", "--dry-run", "--json", tiny=False).out)
-    assert sum(step["name"].startswith("evaluate") for step in plan["steps"]) == 4 * 2 * 3
     assert (
-        sum(step["name"].startswith("sample") for step in plan["steps"]) == 2 + 3 + 1
-    )  # training, test inputs, the random-input figure
+        sum(step["name"].startswith("evaluate") for step in plan["steps"])
+        == 4 * 3 * 3 + 2 * 3 * 3 + 3 * 3 + 2 * 3 + 2 * 3 + 3
+    )
+    assert (
+        sum(step["name"].startswith("sample") for step in plan["steps"]) == 4 + 6 + 1
+    )  # training, test inputs in a box and on a grid, the random-input figure
     assert not (folder / "artefacts").exists()
     assert koop("reproduce", "edmd", "--smoke").code == 2  # with an experiment of its own
     assert (data_folder() / "experiments" / "smoke.toml").is_file()

@@ -202,11 +202,11 @@ def test_an_interrupted_evaluation_goes_on_where_it_stopped(fresh, monkeypatch):
     whole = fresh()[0].make(recipes.evaluation(experiment("evaluate.first=2", "evaluate.chunk=9")))
     real, calls = evaluation.evaluate, []
 
-    def interrupt(predictor, trajectories, rows, first):
+    def interrupt(predictor, trajectories, rows, first, restart):
         if len(calls) == 3:
             raise KeyboardInterrupt
         calls.append(rows)
-        return real(predictor, trajectories, rows, first)
+        return real(predictor, trajectories, rows, first, restart)
 
     from koopcli.stages import evaluate as stage
 
