@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 KOOP := $(BIN)/koop
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-edmd reproduce-eigen smoke test check docs pins bench wheel clean
+.PHONY: help reproduce reproduce-edmd reproduce-eigen smoke test check docs pins bench traps wheel clean
 
 help: ## Show this help
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
@@ -41,6 +41,9 @@ pins: $(VENV)/.developing ## Pin the stages' toy results, after raising a stage'
 
 bench: $(VENV)/.developing ## Measure speed and memory as ratios within one run (minutes)
 	$(BIN)/python benchmarks/run.py
+
+traps: $(VENV)/.developing ## Measure what generic least squares makes of raw monomials (minutes)
+	$(BIN)/python benchmarks/traps.py
 
 wheel: $(VENV)/.developing ## Build the wheel into dist/
 	rm -rf dist

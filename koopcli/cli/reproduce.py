@@ -128,7 +128,8 @@ def _finish(call: Invocation, name: str, parts: Sequence[_Part], *, as_json: boo
 
     for part in parts:
         for table in part.method.tables(part.runs):
-            show_table(table.header, table.rows, title=table.title, file=sys.stderr)
+            left = len(table.header) if table.words else 1
+            show_table(table.header, table.rows, title=table.title, left=left, file=sys.stderr)
         for note in part.method.notes(part.runs):
             call.console.note(note)
         for one in part.illustrations:

@@ -17,7 +17,7 @@ ROUNDS = 30  # of k-means; the centres need not be converged
 
 
 def thin_plate(x: FloatArray, centres: FloatArray, scale: FloatArray) -> FloatArray:
-    """r² log r with r the distance in ``scale``d coordinates (3.2), 0 at 0: (n, centres)."""
+    """r² log r with r the distance in ``scale``d coordinates (3.4), (7.5), 0 at 0: (n, centres)."""
     r2 = np.zeros((len(x), len(centres)))
     for i in range(x.shape[1]):
         r2 += ((x[:, i, np.newaxis] - centres[:, i]) / scale[i]) ** 2

@@ -113,8 +113,9 @@ def _table(table: Table) -> str:
         f'<tr><th scope="row">{_indented(row[0])}</th>{"".join(f"<td>{_text(cell)}</td>" for cell in row[1:])}</tr>'
         for row in table.rows
     )
+    kind = ' class="words"' if table.words else ""
     return (
-        f'<h4>{_text(table.title)}</h4><div class="wide"><table><thead><tr>{head}</tr></thead>'
+        f'<h4>{_text(table.title)}</h4><div class="wide"><table{kind}><thead><tr>{head}</tr></thead>'
         f"<tbody>{rows}</tbody></table></div>"
     )
 

@@ -18,11 +18,12 @@ REDUCED = "This run is not of the paper's size: its figures cannot be put beside
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts."""
+    """A table of texts: figures that stand in columns, or ``words`` of several lines that are read across."""
 
     title: str
     header: list[str]
     rows: list[list[str]]
+    words: bool = False
 
 
 @dataclass(frozen=True)
