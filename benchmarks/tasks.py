@@ -47,6 +47,49 @@ def fit_blocks(store: Path):
     yield float(np.abs(predictor.A).sum())
 
 
+def fit_bilinear(store: Path):
+    data = koopcli.load("simulate", store)
+    yield
+    yield float(np.abs(_bilinear(data).N).sum())
+
+
+def fit_bilinear_blocks(store: Path):
+    from dataclasses import replace
+
+    from scipy.spatial import ConvexHull  # noqa: F401  (imports aside)
+
+    data = replace(koopcli.load("simulate", store), product=None)
+    yield
+    yield float(np.abs(_bilinear(data).N).sum())
+
+
+def _bilinear(data):
+    basis = edmd.basis_from_data(data, Choice("anisotropic", 8))
+    return edmd.fit(data, basis, edmd.Method(bilinear=True))
+
+
+def bilinear_prediction(store: Path):
+    """All trajectories of the test set, rolled together."""
+    predictor, test = _bilinear(koopcli.load("simulate", store)), koopcli.load("simulate", store / "test")
+    x0, u = test.x[:, 0], test.u[:]
+    yield
+    yield float(np.abs(predictor.predict(x0, u)).sum())
+
+
+def bilinear_loop(store: Path):
+    """The same, one trajectory and one input at a time."""
+    predictor, test = _bilinear(koopcli.load("simulate", store)), koopcli.load("simulate", store / "test")
+    x0, u = test.x[:, 0], test.u[:]
+    yield
+    total = float(np.abs(x0).sum())
+    for start, inputs in zip(predictor.lift(x0), u, strict=True):
+        z = start
+        for now in inputs:
+            z = predictor.A @ z + predictor.B @ now + sum(v * (N @ z) for v, N in zip(now, predictor.N, strict=True))
+            total += float(np.abs(predictor.C @ z).sum())
+    yield total
+
+
 def fit_plain(store: Path):
     data = koopcli.load("simulate", store)
     basis = edmd.basis_from_data(data, Choice("tensor", ORDER))
@@ -89,8 +132,9 @@ def eigen_fit(store: Path):
 
 def eigen_dense(store: Path):
     """A tenth of the trajectories and splines as one dense least squares: a hundredth of the unknowns' cost."""
-    from koopcli.koopman.eigenfunctions import dmd_rates, draw_centres, lattice, thin_plate
+    from koopcli.koopman.eigenfunctions import dmd_rates, lattice
     from koopcli.koopman.modes import exponentials
+    from koopcli.koopman.thin_plate import draw_centres, thin_plate
 
     data = koopcli.load("simulate", store)
     x = data.x[::10]
@@ -115,6 +159,10 @@ TASKS = {
     "fit-product": fit_product,
     "fit-blocks": fit_blocks,
     "fit-plain": fit_plain,
+    "fit-bilinear": fit_bilinear,
+    "fit-bilinear-blocks": fit_bilinear_blocks,
+    "bilinear-prediction": bilinear_prediction,
+    "bilinear-loop": bilinear_loop,
     "evaluation": evaluation,
     "slips": slips,
     "eigen-fit": eigen_fit,

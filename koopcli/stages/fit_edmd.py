@@ -47,7 +47,8 @@ def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
     ]
     if still:
         context.warn(
-            f"{', '.join(still)} never moved in these data, so B is zero there: the predictor knows nothing of it"
+            f"{', '.join(still)} never moved in these data, so B is zero there: the predictor knows nothing of it; "
+            "sample inputs that move (sample.levels)"
         )
     return predictor
 
@@ -118,7 +119,7 @@ def _check(task: Task) -> None:
         raise InvalidValueError(
             f"'{lower}' {getattr(settings, lower.partition('.')[2])} needs {N:,} functions with {_terms(task):,} "
             f"{settings.terms} terms and {size_text(8.0 * N * _terms(task))} for them; the limit is {TERMS_LIMIT:,} "
-            "terms: lower it"
+            "terms: lower it, or choose a smaller family (--basis total, anisotropic)"
         )
     if settings.solver == "cholesky-monomials":
         if settings.basis not in FAMILIES:

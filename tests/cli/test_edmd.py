@@ -1,0 +1,145 @@
+"""EDMD from the command line: its bases and terms, what it says of poor data, and what its scores are set beside."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+import koopcli
+from tests.cli.test_errors import one_line
+
+
+@pytest.mark.parametrize(
+    ("options", "functions"),
+    [
+        (["--order", "2"], 27),
+        (["--basis", "total", "--order", "3"], 20),
+        (["--basis", "anisotropic", "--order", "4", "--terms", "bilinear"], 15),
+        (["--basis", "anisotropic", "--order", "3", "--degree-velocity", "2", "--terms", "generator"], 24),
+        (["--basis", "thin-plate", "--centres", "12"], 16),
+        (["--basis", "thin-plate", "--placement", "drawn", "--terms", "bilinear", "--ridge", "1e-6"], 24),
+        (["--basis", "states"], 3),
+        (["--order", "2", "--solver", "cholesky-monomials"], 27),
+    ],
+)
+def test_every_way_to_fit_is_stored_and_scored(koop, folder, options, functions):
+    fit = json.loads(koop("fit-edmd", *options, "--json").out)
+    assert fit["functions"] == functions
+    assert fit["rank"] == fit["directions"]
+    assert fit["condition"] >= 1
+    assert fit["spectral_radius"] > 0.9
+    scored = json.loads(koop("evaluate", fit["name"], "--json").out)
+    assert scored["functions"] == functions
+    assert scored["diverged"] == 0
+    predictor = koopcli.load(fit["name"])
+    assert np.isfinite(predictor.predict([3.0, 1.0, 0.5], np.full((4, 4), 10.0))).all()
+    drawn = koop("plot", "random-input", fit["name"])
+    assert drawn.code == 0, drawn.err
+    assert koop("plot", "spectrum", fit["name"]).code == 0
+    assert koop("show", fit["name"]).code == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "parts"),
+    [
+        (["--basis", "thin-plate", "--centres", "300"], 3, ["300 is too many for 125 different states", "lower it"]),
+        (["--basis", "anisotropic", "--degree-velocity", "5"], 3, ["'fit-edmd.degree_velocity' 5 is too high for 5"]),
+        (["--basis", "total", "--degree-velocity", "2"], 2, ["fit-edmd.basis 'total' has no use for it"]),
+        (["--basis", "thin-plate", "--order", "3"], 2, ["fit-edmd.basis 'thin-plate' has no use for it"]),
+        (["--centres", "30"], 2, ["fit-edmd.basis 'tensor' has no use for it"]),
+        (["--terms", "cubic"], 2, ["'cubic' is not one of"]),
+        (["--ridge", "-1"], 3, ["'fit-edmd.ridge' must be at least 0"]),
+        (["--solver", "cholesky-monomials", "--ridge", "0.1"], 3, ["without 'fit-edmd.ridge'"]),
+        (["--solver", "cholesky-monomials", "--basis", "thin-plate"], 3, ["is for polynomials"]),
+        (["--terms", "generator", "--basis", "states"], 3, ["need a constant", "use 'total'"]),
+        (["--basis", "total", "--order", "60"], 3, ["the limit is 4,096 terms"]),
+    ],
+)
+def test_bad_input_is_one_line(koop, folder, options, code, parts):
+    one_line(koop("fit-edmd", *options), code, *parts)
+    assert not list((folder / "artefacts").rglob("*.h5"))
+
+
+def test_more_functions_than_samples(koop):
+    few = ["--set", "sample.kind=point", "--set", "sample.steps=40"]
+    one_line(koop("fit-edmd", *few, "--order", "4"), 3, "40 samples cannot determine 125 functions", "sample more")
+    one_line(
+        koop("fit-edmd", *few, "--order", "2", "--terms", "bilinear"), 3, "40 samples", "135 bilinear terms together"
+    )
+    one_line(koop("fit-edmd", *few, "--basis", "thin-plate", "--centres", "50"), 3, "50 centres", "40 different states")
+
+
+def test_poor_data_are_named_with_a_remedy(koop):
+    still = koop("fit-edmd", "--set", "sample.levels=[0]", "--terms", "bilinear")
+    assert still.code == 0
+    assert "F_fx, F_fy, F_rx, F_ry never moved in these data" in still.err
+    assert "sample.levels" in still.err
+    assert json.loads(koop("evaluate", still.name, "--json").out)["diverged"] == 0
+    outside = koop("fit-edmd", "--basis", "thin-plate", "--placement", "drawn")
+    assert "centres lie outside the data" in outside.err
+    assert "--placement k-means" in outside.err
+    drowned = koop("fit-edmd", "--order", "4", "--solver", "cholesky-monomials")
+    assert "use the solver 'orthonormal'" in drowned.err
+
+
+def test_a_predictor_stands_beside_its_baselines(koop):
+    """Three of them, each an artefact of its own, and a verdict by the mean error."""
+    done = koop("evaluate", "--json")
+    found = json.loads(done.out)
+    assert set(found["baselines"]) == {"hold", "linearisation", "linear"}
+    for one in found["baselines"].values():
+        assert json.loads(koop("show", one["name"], "--json").out)["figures"]["rmse"] == one["rmse"]
+    best = min(one["rmse"]["mean"] for one in found["baselines"].values())
+    assert found["beats_baselines"] == (found["rmse"]["mean"] < best)
+    assert found["verdict"] in done.err
+    linear = json.loads(koop("evaluate", "--set", "fit-edmd.basis=total", "--set", "fit-edmd.order=1", "--json").out)
+    assert set(linear["baselines"]) == {"hold", "linearisation"}  # it is one of them itself
+    assert linear["rmse"] == found["baselines"]["linear"]["rmse"]
+
+
+def test_the_verdict_is_plain(koop):
+    poor = koop("evaluate", koop("fit-edmd", "--basis", "states").name)
+    assert "warning: the predictor, with" in poor.err
+    assert "does not beat the baseline" in poor.err
+    assert "the baseline 'linearisation at the first state'" in poor.err
+    good = ["--set", "fit-edmd.basis=anisotropic", "--set", "fit-edmd.order=4", "--set", "fit-edmd.terms=generator"]
+    driven = koop("evaluate", *good, "--steps", "30", "--excitation", "held", "--count", "20")
+    assert "beats every baseline" in driven.err
+    assert "warning: the predictor" not in driven.err
+
+
+def test_predictions_that_restart(koop):
+    """The paper's one trajectory, in stretches; the table has a row for each."""
+    done = koop("evaluate", "--restart", "80", "--json")
+    found = json.loads(done.out)
+    assert [segment["start"] for segment in found["segments"]] == [0, 80, 160, 240]
+    assert found["trajectories"] == 1
+    for segment in found["segments"]:
+        assert f"RMSE {segment['rmse']:.4g} %" in done.err
+    rows = list(csv.DictReader(io.StringIO(koop("show", found["name"], "--csv").out)))
+    assert [float(row["start (samples)"]) for row in rows] == [0, 80, 160, 240]
+    assert [float(row["rmse (%)"]) for row in rows] == [segment["rmse"] for segment in found["segments"]]
+    first = json.loads(koop("evaluate", "--set", "test.kind=point", "--steps", "80", "--json").out)
+    assert first["rmse"]["mean"] == pytest.approx(found["segments"][0]["rmse"], rel=1e-9)
+    one_line(koop("plot", "horizon", found["name"]), 3, "restart every 80 steps", "without --restart")
+    one_line(koop("evaluate", "--restart", "7", "--set", "evaluate.first=7"), 3, "the 6 steps of the shortest")
+    one_line(koop("evaluate", "--restart", "50", "--count", "3"), 2, "this test is of kind 'point'")
+    boxed = json.loads(koop("evaluate", "--restart", "2", "--set", "test.kind=box", "--json").out)
+    assert boxed["trajectories"] == 40
+    assert len(boxed["segments"]) == 3
+
+
+def test_test_states_on_a_grid(koop):
+    found = json.loads(koop("evaluate", "--set", "test.layout=product", "--count", "27", "--json").out)
+    rows = csv.DictReader(io.StringIO(koop("show", found["name"], "--csv").out))
+    states = np.array([[float(row[f"{name}_0 ({unit})"]) for name, unit in STATES] for row in rows])
+    assert [len(np.unique(column)) for column in states.T] == [3, 3, 3]
+    assert len(np.unique(states, axis=0)) == 27
+    one_line(koop("evaluate", "--set", "test.layout=product"), 3, "'test.count' 40", "as 27 is")
+
+
+STATES = (("v_x", "m/s"), ("v_y", "m/s"), ("yaw_rate", "rad/s"))
