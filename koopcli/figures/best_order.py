@@ -50,8 +50,8 @@ def draw(shown: BestOrders) -> Figure:
         axes.bar(shown.orders, counts, color=COLOURS[0], width=0.7, label=f"best of {len(shown.best)} training draws")
         there = [order for order in BEST_ORDERS if order in shown.orders]
         axes.plot(there, [0.0] * len(there), "^", color=PAPER, clip_on=False, zorder=5, label="the paper's best orders")
-        for which in (axes.xaxis, axes.yaxis):
-            which.set_major_locator(MaxNLocator(integer=True))
+        axes.set_xticks(shown.orders)
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_xlabel("order of the polynomial basis")
         axes.set_ylabel("training draws (1)")
         legend_below(figure)

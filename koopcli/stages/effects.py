@@ -38,6 +38,9 @@ def _idle_sample(section: str, key: str, tasks: Sequence[Task], behind: Sequence
     """Of a setting of samples, of one kind or of the kind in use, which only evaluations have."""
     tested = _test_samples(behind, ("evaluate", "plot"))
     relevant = tested if section == "test" else _samples(behind) - tested or tested
+    driven = {getattr(one.settings, "excitation", None) for one in relevant}
+    if key.rpartition(".")[2] == "amplitude" and driven == {"none"}:
+        return "the excitation 'none' has no use for it"
     if "." not in key:
         in_use = _test_samples(behind, ("evaluate",)) if section == "test" else relevant
         return _of_nothing(tasks) if tasks and not in_use else None

@@ -59,6 +59,7 @@ def one_line(result, code, *parts):
         (["sample", "--set", "vehicle.Jzz=5"], 2, "vehicle.Jzz changes nothing here: only kinds of sample by kinetic"),
         (["sample", "ball", "--set", "vehicle.rho=5"], 2, "vehicle.rho changes nothing here: only kinds of sample"),
         (["fit-edmd", "--set", "vehicle.mu_scale=2"], 2, "the plant 'forces' has no use for it"),
+        (["evaluate", "--excitation", "none", "--amplitude", "5"], 2, "the excitation 'none' has no use for it"),
         (["fit-edmd", "--set", "vehicle.lateral.mu=2"], 2, "the plant 'forces' has no use for it"),
         (["fit-eigen", "--set", "simulate.force_per=wheel"], 2, "the plant 'slips' has no use for it"),
         (["fit-eigen", "--boundary", "optimal", "--centres", "9"], 2, "'optimal' has no use for it"),
