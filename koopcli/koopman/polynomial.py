@@ -69,13 +69,13 @@ class Polynomial:
 
     def lift(self, x: FloatArray) -> FloatArray:
         """ψ(x) (n, N) of the states (n, n_x)."""
-        factors = [axis(x[:, i]).T for i, axis in enumerate(self.axes)]
-        head, choice = self._leading
-        z = np.ones((len(x), len(head)))
-        for i, factor in enumerate(factors[:-1]):
-            z = z * factor[:, head[:, i]]
-        z = (z[:, :, np.newaxis] * factors[-1][:, np.newaxis, :]).reshape(len(x), len(head) * factors[-1].shape[1])
-        return z if choice is None else z[:, choice]
+        *leading, last = [axis(x[:, i]) for i, axis in enumerate(self.axes)]  # (degree + 1, n) each
+        degrees, choice = self._leading
+        head = np.ones((len(degrees), len(x)))
+        for i, factor in enumerate(leading):
+            head *= factor[degrees[:, i]]
+        z = (head[:, np.newaxis] * last).reshape(len(degrees) * len(last), len(x))
+        return (z if choice is None else z[choice]).T
 
     def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
         """rows · ψ(x) as (n, R), for ``rows`` (R, N)."""
