@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
@@ -30,12 +30,32 @@ class Finding:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the paper: ``found`` judges it by a run, ``shows`` is the command without its experiment."""
+    """A claim of the paper: ``found`` judges it by a run, ``shows`` is the command that shows it."""
 
     text: str
     paper: str
     found: Callable[[Run], Finding | None]
-    shows: Sequence[str]
+    shows: Callable[[Run], Command]
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command: its ``words``, what it ``sets``, and the beginnings of those changes of a run that it ``keeps``."""
+
+    words: tuple[str, ...]
+    sets: Mapping[str, object]
+    keeps: tuple[str, ...]
+
+    def text(self, run: Run) -> str:
+        """As it is typed, for the experiment of ``run``."""
+        told = [] if run.base == "paper" else ["--experiment", run.base]
+        for name, value in self.sets.items():
+            told += ["--set", f"{name}={value}"]
+        for change in run.changes:
+            name = change.partition("=")[0]
+            if name not in self.sets and f"{name}.".startswith(self.keeps):
+                told += ["--set", change]
+        return shlex.join(["koop", *self.words, *told])
 
 
 def claims_table(run: Run) -> Table:
@@ -44,17 +64,9 @@ def claims_table(run: Run) -> Table:
     for claim in CLAIMS:
         finding = claim.found(run)
         if finding is not None:
-            rows.append([claim.text, claim.paper, "\n".join(finding.here), finding.verdict, _command(run, claim.shows)])
+            rows.append([claim.text, claim.paper, "\n".join(finding.here), finding.verdict, claim.shows(run).text(run)])
     title = "The paper's claims" if run.label == "here" else f"The paper's claims, with {run.label}"
     return Table(title, ["claim", "paper", "here", "verdict", "command"], rows, words=True)
-
-
-def _command(run: Run, words: Sequence[str]) -> str:
-    told = [] if run.base == "paper" else ["--experiment", run.base]
-    for change in run.changes:
-        if not change.startswith("reproduce."):
-            told += ["--set", change]
-    return shlex.join(["koop", *words, *told])
 
 
 def scores(run: Run, block: str, **wanted: object) -> list[tuple[blocks.Cell, Meta]]:
@@ -209,32 +221,67 @@ def _verdict(holds: Sequence[bool], yes: str = "holds") -> str:
     return f"holds in {sum(holds)} of {len(holds)} cases" if any(holds) else "does not hold"
 
 
-PLAIN = ("evaluate", "--set")
+DATA = ("vehicle.", "sample.", "simulate.")
+SWEPT = tuple(f"fit-edmd.{name}." for name in ("basis", "degree_velocity", "terms", "ridge", "solver"))
+SPLINED = tuple(f"fit-edmd.{name}." for name in ("centres", "placement", "seed"))
+
+
+def _evaluate(run: Run, keeps: tuple[str, ...] = (), **fit: object) -> Command:
+    """The evaluation of a fit on the first training grid, under the inputs that claims are judged by."""
+    sets = {f"fit-edmd.{name}": value for name, value in fit.items()}
+    return Command(("evaluate",), {**sets, **_first_grid(run), **_test(run)}, (*DATA, "test.", "evaluate.", *keeps))
+
+
+def _first_grid(run: Run) -> dict[str, object]:
+    """What the first training grid differs in from the experiment's own."""
+    first, own = blocks.trainings(run.experiment)[0], blocks.grid(run.experiment)
+    sets: dict[str, object] = {} if first.draw == own.draw else {"sample.draw": first.draw}
+    return sets if first.seed == own.seed else {**sets, "sample.seed": first.seed}
+
+
+def _test(run: Run) -> dict[str, object]:
+    excitation = blocks.excitation(run.experiment)
+    return {} if excitation == blocks.box(run.experiment).excitation else {"test.excitation": excitation}
+
+
+def _show_floor(run: Run) -> Command:
+    fit = blocks.bilinear(run.experiment, "generator")
+    return _evaluate(run, basis=fit.basis, order=fit.order, terms=fit.terms)
+
+
+def _show_orders(run: Run) -> Command:
+    keeps = (*DATA, "test.", "evaluate.", "reproduce.orders.", *SWEPT)
+    return Command(("plot", "orders"), {**_first_grid(run), **_test(run)}, keeps)
+
+
+def _show_forces(run: Run) -> Command:
+    sample, order = blocks.grid(run.experiment), blocks.best_order(run.experiment)
+    shown = _evaluate(run, SWEPT, order=order)
+    largest = f"[{run.experiment.reproduce.training_forces[-1]:g}]"
+    columns = len(sample.levels) * sample.columns
+    return Command(shown.words, {**shown.sets, "sample.levels": largest, "sample.columns": columns}, shown.keeps)
+
+
+def _show_yaw(run: Run) -> Command:
+    sets = {"fit-edmd.order": blocks.best_order(run.experiment), **_first_grid(run)}
+    return Command(("plot", "random-input"), sets, (*DATA, "test.point.", "plot.", *SWEPT))
+
+
 CLAIMS = (
-    Claim(
-        "an error of 11.1 % is the best there is",
-        f"{BEST_RMSE} %, test inputs not stated",
-        _floor,
-        (*PLAIN, "fit-edmd.basis=anisotropic", "--set", "fit-edmd.order=8", "--set", "fit-edmd.terms=generator"),
-    ),
+    Claim("an error of 11.1 % is the best there is", f"{BEST_RMSE} %, test inputs not stated", _floor, _show_floor),
     Claim(
         "polynomials beat thin-plate splines",
         "said, without a figure",
         _splines,
-        (*PLAIN, "fit-edmd.basis=thin-plate"),
+        lambda run: _evaluate(run, SPLINED, basis=blocks.SPLINES),
     ),
-    Claim("orders 6 and 7 are best", "6 and 7", _best, ("plot", "orders")),
+    Claim("orders 6 and 7 are best", "6 and 7", _best, _show_orders),
     Claim(
         "larger bases get worse",
         "grows exponentially",
         _larger,
-        (*PLAIN, "fit-edmd.solver=cholesky-monomials"),
+        lambda run: _evaluate(run, order=blocks.TEXTBOOK_ORDERS[-1], solver="cholesky-monomials"),
     ),
-    Claim(
-        "small training forces beat large ones",
-        "±1 to ±100 N chosen",
-        _forces,
-        (*PLAIN, "sample.levels=[10000]", "--set", "sample.columns=60"),
-    ),
-    Claim("the yaw rate is tracked without error", "without error", _yaw, ("plot", "random-input")),
+    Claim("small training forces beat large ones", "±1 to ±100 N chosen", _forces, _show_forces),
+    Claim("the yaw rate is tracked without error", "without error", _yaw, _show_yaw),
 )

@@ -2,8 +2,12 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
+
+import pytest
 
 from koopcli.config.data import data_folder
+from tests.reproduction.pages import Page
 
 
 def test_the_table_the_report_and_the_pins(koop, folder):
@@ -70,6 +74,29 @@ def test_the_figures_of_the_report_are_those_of_evaluate(koop):
     alone = koop("evaluate", "--json", "--set", "sample.draw=even", "--excitation", "none", "--set", "fit-edmd.order=2")
     assert json.loads(alone.out)["rmse"] == cell["rmse"]
     assert json.loads(alone.out)["name"] == cell["name"]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        (),
+        ("fit-edmd.basis=total", "sample.levels=[1,50]"),
+        ('reproduce.draws=["even"]', 'reproduce.excitations=["held"]', "fit-edmd.centres=9", "test.amplitude=500"),
+    ],
+)
+def test_the_commands_of_the_claims_work_and_show_what_they_claim(koop, folder, changes):
+    told = [word for change in changes for word in ("--set", change)]
+    done = koop("reproduce", "edmd", *told, "--json")
+    report = Page((folder / json.loads(done.out)["path"]).read_text())
+    found = {cell["name"] for run in json.loads(done.out)["runs"] for cell in run["evaluations"]}
+    (last,) = [rows for title, rows in report.tables.items() if title.startswith("The paper's claims")][-1:]
+    assert len(last) == 1 + 3  # its header and what so few orders can judge
+    for row in last[1:]:
+        words = shlex.split(row[-1])[1:]
+        shown = koop(*words, tiny=False)
+        assert shown.code == 0, (row[-1], shown.err)
+        if words[0] == "evaluate":
+            assert shown.name in found
 
 
 def test_what_is_swept_cannot_be_set(koop):
