@@ -105,7 +105,7 @@ def _floor(run: Run) -> Finding:
     for excitation in run.experiment.reproduce.excitations:
         linear = by_order(run, draw, excitation)
         order = min(linear, key=lambda one: linear[one])
-        text = f"{INPUTS[excitation]}: order {order} {_percent(linear[order])}"
+        text = f"{INPUTS[excitation]}: {_percent(linear[order])} (order {order})"
         for terms in ("bilinear", "generator"):
             label = blocks.prospect_name(run.experiment, blocks.bilinear(run.experiment, terms))
             ((_, figures),) = scores(run, blocks.OTHERS, label=label, draw=draw, excitation=excitation)
@@ -126,7 +126,7 @@ def _splines(run: Run) -> Finding | None:
     said, holds = [], []
     for cell, figures in scores(run, blocks.OTHERS, order=None, excitation=excitation):
         polynomial, spline = by_order(run, cell.draw, excitation)[order], mean(figures)
-        said.append(f"{cell.draw}: order {order} {_percent(polynomial)}, splines {_percent(spline)}")
+        said.append(f"{cell.draw}: {_percent(polynomial)} (order {order}), splines {_percent(spline)}")
         holds.append(polynomial < spline)
     if not said:
         return None
@@ -169,15 +169,16 @@ def _larger(run: Run) -> Finding | None:
     for draw in _draws(run):
         means = by_order(run, draw, excitation)
         best, last = min(means.values()), max(means)
-        said.append(f"{draw}: order {last} {_percent(means[last])}, best {_percent(best)}")
+        said.append(f"{draw}: {_percent(means[last])} (order {last}), best {_percent(best)}")
         worse.append(means[last] > WORSE * best)
     text = _verdict(worse)
     textbook = by_order(run, _draws(run)[0], excitation, blocks.TEXTBOOK)
     if textbook:
-        listed = ", ".join(f"{order} {_percent(value)}" for order, value in sorted(textbook.items()))
-        said.append(f"normal equations of monomials, {_draws(run)[0]}: order {listed}")
+        listed = ", ".join(f"{_percent(value)} (order {order})" for order, value in sorted(textbook.items()))
+        said.append(f"by normal equations of monomials, {_draws(run)[0]}: {listed}")
         if max(textbook.values()) > WORSE * min(textbook.values()):
-            text += "; the growth is that of the normal equations' rounding"
+            text += ", by extrapolation" if any(worse) else ""
+            text += "; with the textbook's normal equations it does, by rounding"
     return Finding(said, text)
 
 

@@ -102,7 +102,7 @@ def test_predictions_that_diverge_are_the_worst_there_are():
     found = run_with(error)
     assert verdicts(found)["larger"].startswith("holds")
     (row,) = [row for row in claims_table(found).rows if row[0] == TEXTS["larger"]]
-    assert "order 10 diverges" in row[2]
+    assert "diverges (order 10)" in row[2]
 
 
 def test_growth_of_the_textbooks_regression_is_said_to_be_rounding():
