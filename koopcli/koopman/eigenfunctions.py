@@ -1,85 +1,195 @@
-"""Koopman eigenfunctions from data (docs/equations.md 7): rates, boundary functions, and what C makes of them."""
+"""Koopman eigenfunctions from data (docs/equations.md 7): from trajectories to a predictor."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
 from koopcli.errors import InvalidValueError
+from koopcli.koopman import boundary
 from koopcli.koopman.coverage import coverage_of
-from koopcli.koopman.modes import ComplexArray, Modes, exponentials, newton_couplings
-from koopcli.koopman.predictor import TABLES, Predictor
+from koopcli.koopman.frames import check_frame
+from koopcli.koopman.futures import Futures
+from koopcli.koopman.lookup import LOOKUPS
+from koopcli.koopman.modes import Modes, newton_couplings
+from koopcli.koopman.nodes import Search, nodes_of
+from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.rates import RATES, Spectrum, Windows, check_growth
+from koopcli.koopman.tabulated import Tabulated
 from koopcli.koopman.thin_plate import draw_centres, thin_plate
+from koopcli.koopman.trust import held_back
 from koopcli.records import FloatArray, Trajectories
 
-LARGEST_EXPONENT = 230.0  # e^230 = 1e100: products of a few such numbers are still finite
-SAME = 1e-9  # relative distance below which two rates are one
+
+@dataclass(frozen=True)
+class Reading:
+    """Everything about a fit but its data.
+
+    ``spectrum``: the rates; ``window``: what a lifted state is fitted to, the whole ``trajectory`` or the ``horizon``
+    ahead; ``boundary`` functions ``thin-plate`` (with ``centres`` drawn from ``seed``, in ``raw`` units or scaled by
+    the ``extent`` of the data) or ``optimal``; ``cut``: smallest singular value kept, relative to the largest, working
+    precision if None; ``tabulated`` steps of each trajectory are looked up, and predictions reach ``horizon`` steps.
+    ``lift``, ``power``, ``neighbours``, ``nodes``: see ``nodes.Search``; ``frame`` in which futures are interpolated;
+    ``rounds`` of continuing trajectories that are too short for their table; ``trust``: estimate errors too.
+    """
+
+    spectrum: Spectrum
+    window: str
+    boundary: str
+    centres: int
+    seed: int
+    scaling: str
+    cut: float | None
+    tabulated: int
+    horizon: int
+    lift: str
+    frame: str
+    power: float
+    neighbours: int | None
+    nodes: int | None
+    rounds: int
+    trust: bool
 
 
-def fit(
-    trajectories: Trajectories,
-    *,
-    degree: int,
-    boundary: str,
-    centres: int,
-    seed: int,
-    scaling: str,
-    cut: float | None,
-    tabulated: int,
-    lift: str = "nearest",
-) -> Predictor:
-    """The predictor whose lifted states are eigenfunctions, known at the first ``tabulated`` + 1 samples (7.1).
+def fit(trajectories: Trajectories, reading: Reading, images: int = 1) -> Predictor:
+    """The predictor whose lifted states are eigenfunctions, known at samples and looked up elsewhere (7.1).
 
-    ``degree`` of the lattice of rates; ``boundary`` functions ``thin-plate`` (with ``centres`` drawn from ``seed``, in
-    ``raw`` units or scaled by the ``extent`` of the data) or ``optimal``; ``cut``: smallest singular value kept,
-    relative to the largest, working precision if None; ``lift`` one of ``TABLES``. What is left of each trajectory is
-    the horizon. Raises ``InvalidValueError`` for inputs that change, trajectories too short for the table or for the
-    number of rates, and rates that overflow.
+    The trajectories are ``images`` times as many as were observed, mirror images after one another. Raises
+    ``InvalidValueError`` for inputs that change, trajectories too short for the table or for the number of rates,
+    rates that overflow, and data too few for the lift.
     """
     x, dt = autonomous(trajectories), trajectories.dt
-    check_window(trajectories.steps, tabulated, dt)
-    check_modes(lattice_size(x.shape[2], degree), trajectories.steps)
-    rates = lattice(dmd_rates(x, dt), degree)
-    check_growth(rates, trajectories.steps * dt)
-    cut = np.finfo(float).eps * x.shape[1] if cut is None else cut
-    window = trajectories.steps * dt
-    block = Modes(rates, newton_couplings(rates, window), 1, dt)
-    if boundary == "thin-plate":
+    check_window(trajectories.steps, reading, dt)
+    length = reading.horizon if reading.window == "horizon" else trajectories.steps
+    check_modes(reading.spectrum.count(x.shape[2]), length)
+    rates = RATES[reading.spectrum.kind](x, _windows(x, length), dt, reading.spectrum)
+    check_growth(rates, length * dt)
+    modes = Modes(rates, newton_couplings(rates, length * dt), 1, dt)
+    make = _ahead if reading.window == "horizon" else _along
+    return make(trajectories, x, reading, modes, images)
+
+
+def _along(trajectories: Trajectories, x: FloatArray, reading: Reading, modes: Modes, images: int) -> Predictor:
+    """Eigenfunctions from Γ: what the initial states have is carried along each trajectory."""
+    cut = _cut(reading, x.shape[1])
+    if reading.boundary == "thin-plate":
         half = np.ptp(x, axis=(0, 1)) / 2
-        scale = np.where(half > 0, half, 1.0) if scaling == "extent" else np.ones(x.shape[2])
-        solution = fit_given(x, thin_plate(x[:, 0], draw_centres(x, centres, seed), scale), block, cut)
+        scale = np.where(half > 0, half, 1.0) if reading.scaling == "extent" else np.ones(x.shape[2])
+        centres = draw_centres(x, reading.centres, reading.seed)
+        solution = boundary.fit_given(x, thin_plate(x[:, 0], centres, scale), modes, cut)
     else:
-        solution = fit_free(x, block, cut)
-    modes = replace(block, copies=solution.starts.shape[1])
-    table = x[:, : tabulated + 1]
-    states = table.reshape(-1, x.shape[2])
+        solution = boundary.fit_free(x, modes, cut)
+    repeated = replace(modes, copies=solution.starts.shape[1])
+    table = x[:, : reading.tabulated + 1]
+    nodes = nodes_of(table, table.shape[1], _search(reading, x))
+    lift = Tabulated(table, nodes, solution.starts, repeated)
+    rank, directions = solution.rank, solution.directions
+    return _predictor(trajectories, reading, lift, solution.C, rank, directions, solution.condition, solution.missed)
+
+
+def _ahead(trajectories: Trajectories, x: FloatArray, reading: Reading, modes: Modes, images: int) -> Predictor:
+    """Lifted states fitted to what follows within the horizon."""
+    check_frame(reading.frame, trajectories.state_channels)
+    horizon, n_x = reading.horizon, x.shape[2]
+    time = boundary.time_part(modes, horizon + 1)
+    cut = _cut(reading, horizon + 1)
+    onto, modes = boundary.projection(time, cut), replace(modes, copies=n_x)
+    search = _search(reading, x)
+    known = min(x.shape[1] - 1 - horizon, reading.tabulated)
+
+    def futures(data: FloatArray, samples: int) -> Futures:
+        return Futures(data, nodes_of(data, samples, search), reading.frame, onto, modes)
+
+    lift = futures(x, known + 1)
+    for _ in range(reading.rounds if reading.tabulated > known else 0):
+        ahead = lift.future(x[:, -1])[:, 1 : reading.tabulated - known + 1]
+        lift = futures(np.concatenate([x, ahead], axis=1), reading.tabulated + 1)
+    C = boundary.read_off(n_x, len(modes.rates))
+    rank = int((time.singular > cut * time.singular[0]).sum())
+    condition, missed = boundary.condition_of(time.singular), boundary.missed_ahead(x, time, cut)
+    found = _predictor(trajectories, reading, lift, C, rank, len(modes.rates), condition, missed)
+    if not reading.trust:
+        return found
+    groups = np.tile(np.arange(len(x) // images), images)
+
+    def predict(part: Futures, x0: FloatArray) -> FloatArray:
+        return replace(found, observables=part).predict(x0, steps=horizon)
+
+    return replace(found, trust=held_back(lift, known, groups, predict))
+
+
+def _predictor(
+    trajectories: Trajectories,
+    reading: Reading,
+    lift: Tabulated | Futures,
+    C: FloatArray,
+    rank: int,
+    directions: int,
+    condition: float,
+    missed: float,
+) -> Predictor:
+    """What both kinds of lift have in common."""
+    states, modes = lift.nodes.states, lift.modes
     return Predictor(
-        observables=TABLES[lift](table, solution.starts, modes),
+        observables=lift,
         A=modes,
         B=np.zeros((len(modes), len(trajectories.input_channels))),
-        C=solution.C,
-        dt=dt,
+        C=C,
+        dt=trajectories.dt,
         coverage=coverage_of(lambda: [states], len(states)),
         state_channels=trajectories.state_channels,
         input_channels=trajectories.input_channels,
-        rank=solution.rank,
-        directions=solution.directions,
-        condition=solution.condition,
+        rank=rank,
+        directions=directions,
+        condition=condition,
         spectral_radius=float(np.abs(modes.eigenvalues).max()),
-        horizon=trajectories.steps - tabulated,
+        horizon=reading.horizon,
         plant=trajectories.plant,
+        missed=missed,
+        beyond=LOOKUPS[reading.lift].beyond,
     )
 
 
-def check_window(steps: int, tabulated: int, dt: float) -> None:
-    """Raise ``InvalidValueError`` where ``tabulated`` of ``steps`` samples leave nothing to predict with."""
-    if tabulated >= steps:
+def _search(reading: Reading, x: FloatArray) -> Search:
+    """Distances are in the largest magnitude of each state; those of the nearest sample alone in raw units (7.6)."""
+    size = np.abs(x).max(axis=(0, 1))
+    raw = reading.lift == "nearest" and reading.power == 1.0
+    scale = np.ones(x.shape[2]) if raw else np.where(size > 0, size, 1.0)
+    return Search(reading.lift, scale, reading.power, reading.neighbours, reading.nodes)
+
+
+def _cut(reading: Reading, samples: int) -> float:
+    return float(np.finfo(float).eps * samples) if reading.cut is None else reading.cut
+
+
+def _windows(x: FloatArray, length: int) -> Windows:
+    """All windows of ``length`` steps of the trajectories, by where they start."""
+    return [x[:, k : k + length + 1] for k in range(x.shape[1] - length)]
+
+
+def check_window(steps: int, reading: Reading, dt: float) -> None:
+    """Raise ``InvalidValueError`` where a table and the horizon after it do not fit into ``steps``."""
+    tabulated, horizon = reading.tabulated, reading.horizon
+    if tabulated >= steps and not reading.rounds:
         raise InvalidValueError(
             f"'fit-eigen.tabulate' of {tabulated * dt:g} s leaves nothing of trajectories of {steps * dt:g} s: a "
             "looked-up state is followed to the end of its trajectory; tabulate less, or simulate more steps"
+        )
+    if horizon > steps:
+        raise InvalidValueError(
+            f"'fit-eigen.horizon' of {horizon * dt:g} s is longer than trajectories of {steps * dt:g} s: simulate more "
+            "steps, or ask for a shorter horizon"
+        )
+    if tabulated + horizon > steps and not reading.rounds:
+        raise InvalidValueError(
+            f"trajectories of {steps * dt:g} s do not hold the horizon of {horizon * dt:g} s after each of the first "
+            f"{tabulated * dt:g} s: tabulate less, simulate more steps, or continue them (fit-eigen.rounds)"
+        )
+    if tabulated > steps:
+        raise InvalidValueError(
+            f"'fit-eigen.tabulate' of {tabulated * dt:g} s is longer than trajectories of {steps * dt:g} s: tabulate "
+            "less, or simulate more steps"
         )
 
 
@@ -87,8 +197,8 @@ def check_modes(modes: int, steps: int) -> None:
     """Raise ``InvalidValueError`` for more ``modes`` than samples to tell them apart."""
     if modes > steps:
         raise InvalidValueError(
-            f"'fit-eigen.degree' gives {modes:,} rates for trajectories of {steps} steps, which cannot tell them "
-            "apart: lower the degree or simulate more steps"
+            f"{modes:,} rates are too many for windows of {steps} steps, which cannot tell them apart: lower "
+            "fit-eigen.degree or fit-eigen.pairs, or simulate more steps"
         )
 
 
@@ -111,145 +221,15 @@ def autonomous(trajectories: Trajectories) -> FloatArray:
     return x
 
 
-def dmd_rates(x: FloatArray, dt: float) -> ComplexArray:
-    """The rates log(eig)/dt in 1/s of the best linear map x_k → x_{k+1} over ``x`` (J, samples, n_x), eq. (7.3).
+def with_images(trajectories: Trajectories, signs: list[FloatArray]) -> Trajectories:
+    """The trajectories and their mirror images under each of ``signs`` (n_x,), one kind after another.
 
-    Raises ``InvalidValueError`` where an eigenvalue is zero or negative and so has no rate.
+    Raises ``InvalidValueError`` for inputs other than zero, which have images of their own.
     """
-    n_x = x.shape[2]
-    now, then = x[:, :-1].reshape(-1, n_x), x[:, 1:].reshape(-1, n_x)
-    eigenvalues = np.linalg.eigvals(np.linalg.lstsq(now, then, rcond=None)[0].T).astype(complex)
-    for value in eigenvalues:
-        if value.imag == 0 and value.real <= 0:
-            raise InvalidValueError(
-                f"the best linear map of these trajectories has the eigenvalue {value.real:.3g}, which no continuous "
-                "rate has: give trajectories that move in every state, or sample faster (a smaller simulate.dt)"
-            )
-    return np.asarray(np.log(eigenvalues) / dt)
-
-
-def lattice_size(states: int, degree: int) -> int:
-    """How many sums of up to ``degree`` rates there are, zero included."""
-    return math.comb(states + degree, degree)
-
-
-def lattice(rates: ComplexArray, degree: int) -> ComplexArray:
-    """All sums Σ p_i λ_i with whole p_i ≥ 0 and Σ p_i ≤ ``degree``, equal ones once, by rising degree, eq. (7.4).
-
-    A complex rate is followed by its conjugate.
-    """
-    powers = [p for p in product(range(degree + 1), repeat=len(rates)) if sum(p) <= degree]
-    powers.sort(key=lambda p: (sum(p), [-n for n in p]))
-    found: list[complex] = []
-    for p in powers:
-        rate = complex(np.dot(p, rates))
-        if abs(rate.imag) <= SAME * (1 + abs(rate)):
-            rate = complex(rate.real)
-        if rate.imag >= 0 and all(abs(rate - other) > SAME * (1 + abs(rate)) for other in found):
-            found.append(rate)
-    return np.array([one for rate in found for one in ((rate,) if rate.imag == 0 else (rate, rate.conjugate()))])
-
-
-def check_growth(rates: ComplexArray, seconds: float) -> None:
-    """Raise ``InvalidValueError`` where e^{λT} would leave the floating-point range within ``seconds``."""
-    fastest = rates[rates.real.argmax()]
-    if fastest.real * seconds > LARGEST_EXPONENT:
-        raise InvalidValueError(
-            f"the rate {fastest.real:.4g} 1/s makes exp(rate · time) overflow within {seconds:g} s: "
-            "lower fit-eigen.degree or simulate.steps, or give trajectories that do not grow"
-        )
-
-
-@dataclass(frozen=True)
-class Solution:
-    """Lifted initial states ``starts`` (J, copies, L or 1) and ``C`` (n_x, copies · L), with the regression's numbers.
-
-    ``rank`` of ``directions`` were kept; ``condition`` is the largest over the smallest singular value before the cut.
-    """
-
-    starts: FloatArray
-    C: FloatArray
-    rank: int
-    directions: int
-    condition: float
-
-
-@dataclass(frozen=True)
-class _Time:
-    """The exponentials over the window, taken apart: e^{λt} / length = ``left`` · diag(``singular``) · …
-
-    ``driven`` (L, L) writes the columns of ``left`` as what a block does when its first state is set, ``seen`` as what
-    its last state does when all are set.
-    """
-
-    left: FloatArray
-    singular: FloatArray
-    driven: FloatArray
-    seen: FloatArray
-
-
-def _time(modes: Modes, samples: int) -> _Time:
-    """The time part of the regressors, in coordinates in which sums of it lose no digits (7.2)."""
-    V = exponentials(modes.rates, modes.dt * np.arange(float(samples)))
-    left, singular, _ = np.linalg.svd(V / _lengths(V), full_matrices=False)
-    powers = modes.powers(samples - 1)
-    return _Time(left, singular, _coordinates(powers[:, :, 0], left), _coordinates(powers[:, -1, :], left))
-
-
-def _coordinates(basis: FloatArray, values: FloatArray) -> FloatArray:
-    """``values`` (samples, m) in the columns of ``basis`` (samples, L), (L, m)."""
-    size = _lengths(basis)
-    return np.asarray(np.linalg.lstsq(basis / size, values, rcond=None)[0] / size[:, np.newaxis])
-
-
-def fit_given(x: FloatArray, g: FloatArray, modes: Modes, cut: float) -> Solution:
-    """C by least squares of ``x`` (J, samples, n_x) on g(x_0) ⊗ e^{λt}, for ``g`` (J, functions), eq. (7.7).
-
-    The singular values of the regressors are the products of those of their two factors, columns scaled to length
-    one; directions below ``cut`` times the largest are left out. The functions g are recombined to be orthonormal on
-    the initial states: the same eigenfunctions span the same fit, without the digits that near-dependent g would cost.
-    ``modes`` has one copy here.
-    """
-    time = _time(modes, x.shape[1])
-    left, singular, _ = np.linalg.svd(g / _lengths(g), full_matrices=False)
-    both = np.outer(singular, time.singular)
-    keep = both > cut * both.max()
-    seen = np.tensordot(np.tensordot(left.T, x, axes=1), time.left, axes=(1, 0))  # (copies, n_x, L)
-    C = np.where(keep, seen.transpose(1, 0, 2), 0.0) @ time.driven.T
-    return Solution(
-        starts=left[:, :, np.newaxis],
-        C=C.reshape(x.shape[2], -1),
-        rank=int(keep.sum()),
-        directions=both.size,
-        condition=_ratio(both),
-    )
-
-
-def fit_free(x: FloatArray, modes: Modes, cut: float) -> Solution:
-    """The best boundary values for every state, rate and trajectory of ``x`` (J, samples, n_x), eq. (7.8).
-
-    One small least squares for each trajectory, all with the same regressors; ``C`` then only reads off the last state
-    of each block. ``modes`` has one copy here.
-    """
-    time = _time(modes, x.shape[1])
-    keep = time.singular > cut * time.singular[0]
-    starts = np.tensordot(x, time.left[:, keep], axes=(1, 0)) @ time.seen[:, keep].T  # (J, n_x, L)
-    n_x, L = x.shape[2], len(modes.rates)
-    C = np.zeros((n_x, n_x, L))
-    C[np.arange(n_x), np.arange(n_x), -1] = 1.0
-    return Solution(
-        starts=starts,
-        C=C.reshape(n_x, -1),
-        rank=int(keep.sum()),
-        directions=L,
-        condition=_ratio(time.singular),
-    )
-
-
-def _lengths(columns: FloatArray) -> FloatArray:
-    length = np.linalg.norm(columns, axis=0)
-    return np.asarray(np.where(length > 0, length, 1.0))
-
-
-def _ratio(singular: FloatArray) -> float:
-    return float(singular.max() / singular.min()) if singular.min() > 0 else math.inf
+    if not signs:
+        return trajectories
+    if np.asarray(trajectories.u[0]).any():
+        raise InvalidValueError("mirror images are those of a car that rolls by itself: these trajectories have inputs")
+    x, u = np.asarray(trajectories.x[:]), np.asarray(trajectories.u[:])
+    more = [x, *(x * one for one in signs)]
+    return replace(trajectories, x=np.concatenate(more), u=np.concatenate([u] * len(more)), product=None)

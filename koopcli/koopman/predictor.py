@@ -15,10 +15,14 @@ from koopcli.koopman.bases import STORED
 from koopcli.koopman.coverage import Coverage
 from koopcli.koopman.lifts import Lift, Observed
 from koopcli.koopman.modes import Modes
-from koopcli.koopman.tabulated import Nearest
+from koopcli.koopman.futures import Futures
+from koopcli.koopman.tabulated import Tabulated
+from koopcli.koopman.trust import Trust
 from koopcli.records import Array, Channels, FloatArray, Meta, Packed
 
-TABLES: dict[str, type[Nearest]] = {Nearest.kind: Nearest}  # lifts that look eigenfunctions up
+TABLES: dict[str, type[Tabulated] | type[Futures]] = {table.kind: table for table in (Tabulated, Futures)}  # of samples
+
+EXTRAPOLATES = "continue the functions fitted inside"
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,8 @@ class Predictor:
     ``A`` (N, N) as a matrix or by its rates, ``B`` (N, n_u), ``C`` (n_x, N), ``N`` the N_i (n_u, N, N) or None,
     ``generator`` (1 + n_u, N, N) in 1/s or None; ``dt`` in s; ``coverage``: where the training states lie; ``plant``
     what was identified, as JSON; ``rank`` of ``directions`` and ``condition`` of the regression; ``horizon``: the steps
-    that it may be asked for, None for any.
+    that it may be asked for, None for any; ``missed``: the share of the data in percent that its exponentials do not
+    hold; ``beyond``: what it does outside the hull of its data; ``trust``: an estimate of its errors.
     """
 
     observables: Lift
@@ -48,6 +53,9 @@ class Predictor:
     plant: Meta = field(default_factory=dict)
     N: FloatArray | None = None
     generator: FloatArray | None = None
+    missed: float | None = None
+    beyond: str = EXTRAPOLATES
+    trust: Trust | None = None
 
     @property
     def functions(self) -> int:
@@ -93,6 +101,12 @@ class Predictor:
             x = responses.rolled(self.observables, self._advance, self.C, x0, u)
         return x.reshape(*shape, k + 1, n_x)
 
+    def bound(self, x: FloatArray) -> FloatArray | None:
+        """What the error in percent of a prediction from ``x`` (n, n_x) stays below nine times in ten, (n,), where the
+        fit has estimated it.
+        """
+        return None if self.trust is None else self.trust.bound(x)
+
     def step(self, x: FloatArray, u: FloatArray) -> FloatArray:
         """One step from the states ``x`` (n, n_x) lifted afresh, under ``u`` (n, n_u)."""
         if self._advance is None:
@@ -126,6 +140,9 @@ class Predictor:
             **{f"coverage/{name}": array for name, array in coverage.arrays.items()},
             **{f"lift/{name}": array for name, array in observables.arrays.items()},
         }
+        trust = None if self.trust is None else self.trust.pack(state)
+        if trust is not None:
+            arrays |= {f"trust/{name}": array for name, array in trust.arrays.items()}
         meta = {
             "dt": self.dt,
             "copies": self.A.copies if isinstance(self.A, Modes) else None,
@@ -135,6 +152,9 @@ class Predictor:
             "spectral_radius": self.spectral_radius,
             "horizon": self.horizon,
             "plant": self.plant,
+            "missed": self.missed,
+            "beyond": self.beyond,
+            "trust": None if trust is None else trust.meta,
             "lift": observables.meta,
             "state_channels": self.state_channels.pack(),
             "input_channels": self.input_channels.pack(),
@@ -169,6 +189,9 @@ class Predictor:
             spectral_radius=meta["spectral_radius"],
             horizon=meta["horizon"],
             plant=meta["plant"],
+            missed=meta["missed"],
+            beyond=meta["beyond"],
+            trust=None if meta["trust"] is None else Trust.unpack(Packed(_below("trust/", arrays), meta["trust"])),
         )
 
 

@@ -1,0 +1,97 @@
+"""Lifted states from what followed nearby samples, over the horizon and no further (docs/equations.md 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+
+from koopcli.koopman.frames import FRAMES
+from koopcli.koopman.lifts import Observed
+from koopcli.koopman.modes import Modes
+from koopcli.koopman.nodes import Nodes
+from koopcli.records import Array, FloatArray, Packed
+
+TOGETHER = 4096  # states lifted at once
+
+
+@dataclass(frozen=True)
+class Futures:
+    """ψ(x): the exponentials that fit the interpolated future of x best.
+
+    ``trajectories`` (J, samples, n_x); ``nodes``: those of their samples that are looked up; ``frame``: in which what
+    follows them is interpolated; ``projection`` (L, horizon + 1): from the samples of a future to the states of a
+    block of ``modes``, of which each state of the plant has one.
+    """
+
+    trajectories: FloatArray
+    nodes: Nodes
+    frame: str
+    projection: FloatArray
+    modes: Modes
+
+    kind = "futures"
+
+    @property
+    def functions(self) -> int:
+        """Dimension N of the lifted state."""
+        return len(self.modes)
+
+    def future(self, x: FloatArray) -> FloatArray:
+        """What follows the states ``x`` (n, n_x), interpolated: (n, horizon + 1, n_x). The first sample is x."""
+        n, samples, n_x = len(x), self.projection.shape[1], x.shape[1]
+        out = np.empty((n, samples, n_x))
+        frame = FRAMES[self.frame]
+        for start in range(0, n, TOGETHER):
+            here = x[start : start + TOGETHER]
+            seen = self._combined(here).reshape(len(here), samples, n_x)
+            out[start : start + TOGETHER] = frame.back(seen, here, self.modes.dt)
+        return out
+
+    def lift(self, x: FloatArray) -> FloatArray:
+        """ψ(x) (n, N) of the states (n, n_x)."""
+        blocks = np.matmul(self.projection, self.future(x))  # (n, L, n_x)
+        return blocks.transpose(0, 2, 1).reshape(len(x), self.functions)
+
+    def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
+        """rows · ψ(x) as (n, R), for ``rows`` (R, N)."""
+        return self.lift(x) @ rows.T
+
+    def onto(self, rows: FloatArray) -> Observed:
+        """The function of ``x`` (n, n_x) that observes ``rows`` (R, N)."""
+        return partial(self.observe, rows=rows)
+
+    def _combined(self, x: FloatArray) -> FloatArray:
+        """The weighted sums of the nodes' futures, (n, samples · n_x)."""
+        from scipy.sparse import csr_matrix  # noqa: PLC0415  (what only reads a predictor goes without)
+
+        indices, weights = self.nodes.find(x)
+        ends = np.arange(len(x) + 1) * indices.shape[1]
+        table = csr_matrix((weights.ravel(), indices.ravel(), ends), shape=(len(x), len(self._values)))
+        return np.asarray(table @ self._values)
+
+    @cached_property
+    def _values(self) -> FloatArray:
+        """What follows every node, in the frame, (nodes, samples · n_x)."""
+        samples = self.projection.shape[1]
+        j, k = self.nodes.trajectory, self.nodes.sample
+        ahead = self.trajectories[j[:, np.newaxis], k[:, np.newaxis] + np.arange(samples)]
+        return FRAMES[self.frame].seen(ahead, self.modes.dt).reshape(len(j), -1)
+
+    def pack(self) -> Packed:
+        """Trajectories, nodes and projection."""
+        nodes = self.nodes.pack()
+        arrays = {
+            "trajectories": Array(self.trajectories, ("trajectory", "sample", "state"), "those of the state"),
+            "projection": Array(self.projection, ("state of a block", "sample"), "1"),
+            **nodes.arrays,
+        }
+        return Packed(arrays, {"kind": self.kind, "frame": self.frame, "search": nodes.meta})
+
+    @classmethod
+    def unpack(cls, packed: Packed, modes: Modes) -> Futures:
+        """The inverse of :meth:`pack`."""
+        trajectories = packed.arrays["trajectories"].values[...]
+        nodes = Nodes.unpack(Packed(packed.arrays, packed.meta["search"]), trajectories)
+        return cls(trajectories, nodes, packed.meta["frame"], packed.arrays["projection"].values[...], modes)
