@@ -122,11 +122,13 @@ def eigen_fit(store: Path):
     from scipy.linalg import expm  # noqa: F401  (imports aside)
     from scipy.spatial import ConvexHull  # noqa: F401
 
+    from koopcli.config.settings import FitEigen
     from koopcli.koopman.eigenfunctions import fit
+    from koopcli.stages.fit_eigen import reading
 
     data = koopcli.load("simulate", store)
     yield
-    predictor = fit(data, degree=2, boundary="thin-plate", centres=441, seed=0, scaling="raw", cut=1e-14, tabulated=100)
+    predictor = fit(data, reading(FitEigen().settled(), data.steps, data.dt))
     yield float(predictor.rank)
 
 

@@ -11,6 +11,9 @@ import pytest
 from koopcli.__main__ import main
 from koopcli.checks import COMMAND_LINE
 from koopcli.config.data import locate
+from koopcli.koopman import eigenfunctions
+from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.rates import Spectrum
 from koopcli.records import Sample, Trajectories
 from koopcli.simulation import sampling
 from koopcli.simulation.integrate import simulate
@@ -50,6 +53,9 @@ excitations = ["none", "fresh"]
 seeds = [0, 1]
 cuts = [1e-8]
 mu_scales = [2.0]
+unseen = ["bmw-320i"]
+pairs = [2, 4]
+budgets = [30.0, 20.0]
 """
 
 
@@ -141,6 +147,32 @@ def trajectories_of(plant: Plant, sample: Sample, steps: int, dt: float = 0.01) 
     x0, u = sample.expand(steps)
     x = simulate(plant.rhs, x0, u, dt, fastest_rate=plant.fastest_rate)
     return Trajectories(x, u, dt, plant.states, plant.inputs, sample.product)
+
+
+def eigen_fit(data: Trajectories, images: int = 1, **given) -> Predictor:
+    """The eigenfunction predictor of ``data`` with the paper's reading but for what is ``given``."""
+    rates = {"kind": "dmd", "degree": 2, "pairs": 10, "low": 2.0, "high": 26.0, "damping": 1.0}
+    rates |= {name: given.pop(name) for name in tuple(given) if name in rates}
+    about = {
+        "window": "trajectory",
+        "boundary": "thin-plate",
+        "centres": 441,
+        "seed": 0,
+        "scaling": "raw",
+        "cut": None,
+        "tabulated": 100,
+        "lift": "nearest",
+        "frame": "state",
+        "power": 1.0,
+        "neighbours": None,
+        "nodes": None,
+        "spacing": None,
+        "rounds": 0,
+        "trust": False,
+        **given,
+    }
+    about.setdefault("horizon", data.steps - about["tabulated"])
+    return eigenfunctions.fit(data, eigenfunctions.Reading(spectrum=Spectrum(**rates), **about), images)
 
 
 def grid_sample(count: int = 15, draw: str = "random", seed: int = 0, columns: int = 15) -> Sample:

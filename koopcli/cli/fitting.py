@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
@@ -18,16 +18,20 @@ from koopcli.cli.options import (
     names,
 )
 from koopcli.config.experiment import Changes, Values
+from koopcli.config.samples import Mirror
 from koopcli.config.settings import (
     BaselineKind,
     BasisName,
     Boundary,
+    Coordinates,
+    Eigenvalues,
     FitEdmd,
     FitEigen,
     LiftName,
     Placement,
     Solver,
     Terms,
+    Window,
 )
 
 DATA = ("sample", "vehicle", "simulate")  # the sections behind trajectories
@@ -121,19 +125,38 @@ def fit_eigen(
         str | None,
         typer.Argument(autocompletion=complete_name, help="Trajectories; made from the settings when left out."),
     ] = None,
+    eigenvalues: Annotated[
+        Eigenvalues | None,
+        typer.Option(
+            metavar=names(Eigenvalues),
+            help="Rates of growth: sums of the data's own (dmd), as in the paper; a comb of frequencies, which needs "
+            f"no data; the best ones for the data, by variable projection ({FitEigen.eigenvalues}).",
+        ),
+    ] = None,
     degree: Annotated[
         int | None,
         typer.Option(
-            help="Rates of growth are sums of up to this many of the data's three: 1, 2, 3 give 4, 10, 20 rates "
+            help="dmd: rates are sums of up to this many of the data's three: 1, 2, 3 give 4, 10, 20 of them "
             f"({FitEigen.degree})."
+        ),
+    ] = None,
+    pairs: Annotated[
+        int | None, typer.Option(help="comb, varpro: pairs of complex rates, beside two real ones (10, 6).")
+    ] = None,
+    window: Annotated[
+        Window | None,
+        typer.Option(
+            metavar=names(Window),
+            help="What a lifted state is fitted to: the whole trajectory from Γ, as in the paper, or the horizon ahead "
+            f"of each sample ({FitEigen.window}).",
         ),
     ] = None,
     boundary: Annotated[
         Boundary | None,
         typer.Option(
             metavar=names(Boundary),
-            help="Values of the eigenfunctions at the initial states: thin-plate splines of the state, as in the "
-            f"paper, or the best ones for each trajectory ({FitEigen.boundary}).",
+            help="window trajectory: values of the eigenfunctions at the initial states, thin-plate splines of the "
+            f"state, as in the paper, or the best ones for each trajectory ({FitEigen.boundary}).",
         ),
     ] = None,
     centres: Annotated[int | None, typer.Option(help=f"thin-plate: number of splines ({FitEigen.centres}).")] = None,
@@ -145,13 +168,41 @@ def fit_eigen(
         ),
     ] = None,
     lift: Annotated[
-        LiftName | None, typer.Option(metavar=names(LiftName), help=f"How a state is looked up ({FitEigen.lift}).")
+        LiftName | None,
+        typer.Option(
+            metavar=names(LiftName),
+            help="How a state is looked up: the nearest sample, linear between samples (Delaunay), moving least "
+            f"squares, or local polyharmonic splines ({FitEigen.lift}).",
+        ),
+    ] = None,
+    coordinates: Annotated[
+        Coordinates | None,
+        typer.Option(
+            metavar=names(Coordinates),
+            help="window horizon: interpolate states, or the motion as seen from outside, turned back by the predicted "
+            f"yaw ({FitEigen.coordinates}).",
+        ),
     ] = None,
     tabulate: Annotated[
         float | None,
         typer.Option(
             help="Seconds of each trajectory in which a state is looked up; what is simulated beyond is the longest "
             f"prediction ({FitEigen.tabulate:g})."
+        ),
+    ] = None,
+    mirror: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar=names(Mirror),
+            autocompletion=lambda: list(get_args(Mirror)),
+            help="Mirror images of the trajectories are data too: of a car that is the same to the left and to the "
+            "right, or at both axles. May be given twice.",
+        ),
+    ] = None,
+    trust: Annotated[
+        bool | None,
+        typer.Option(
+            "--trust", help="window horizon: estimate errors from data held back, for a bound at every state."
         ),
     ] = None,
     vehicle: VehicleOption = None,
@@ -167,15 +218,24 @@ def fit_eigen(
     them an eigenfunction grows as exp(rate · time) from its value on Γ; a new state takes the values of the nearest
     sample. Inputs have no effect on the prediction.
 
-    Example: koop fit-eigen --boundary optimal --cut 1e-10
+    That is the paper's predictor. The experiment best-eigen has the best one: initial states in the volume (kind
+    greedy), a comb of rates, lifted states fitted to the horizon ahead, splines in world coordinates.
+
+    Example: koop fit-eigen --experiment best-eigen --vehicle bmw-320i
     """
     fit: Values = {
+        "eigenvalues": eigenvalues,
         "degree": degree,
+        "pairs": pairs,
+        "window": window,
         "boundary": boundary,
         "centres": centres,
         "cut": cut,
         "lift": lift,
+        "coordinates": coordinates,
         "tabulate": tabulate,
+        "mirror": mirror or None,
+        "trust": trust,
     }
     call = begin(store, experiment, set_, (*DATA, "fit-eigen"), {"fit-eigen": fit, "vehicle": {"name": vehicle}})
     from koopcli.stages import recipes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
@@ -19,16 +19,18 @@ from koopcli.cli.options import (
     names,
 )
 from koopcli.config.experiment import Values
+from koopcli.config.plants import PlantName
 from koopcli.config.samples import (
     BallSample,
     BoxSample,
     Draw,
     EllipsoidSample,
     Excitation,
+    GreedySample,
     GridSample,
     Kind,
     Mesh,
-    PlantName,
+    Mirror,
     PointSample,
 )
 from koopcli.config.settings import ForcePer, Simulate
@@ -44,14 +46,15 @@ def sample(
             metavar=names(Kind),
             help="grid: the EDMD dataset (the default); box: test states for it; point: one state, the start of the "
             "paper's trajectory under random inputs; ellipsoid: Γ, the states of one kinetic energy that "
-            "eigenfunctions start from; ball: test states inside it.",
+            "eigenfunctions start from; greedy: states inside it, each where data are missing; ball: test states "
+            "inside it.",
         ),
     ] = None,
     seed: Annotated[
         int | None,
         typer.Option(
             help=f"Seed of every draw (grid: {GridSample.seed}, box: {BoxSample.seed}, point: {PointSample.seed}, "
-            f"ball: {BallSample.seed})."
+            f"greedy: {GreedySample.seed}, ball: {BallSample.seed})."
         ),
     ] = None,
     count: Annotated[
@@ -72,17 +75,34 @@ def sample(
         float | None, typer.Option(help=f"box, point: inputs within ± amplitude, in N ({BoxSample.amplitude:g}).")
     ] = None,
     energy: Annotated[
-        float | None, typer.Option(help=f"ellipsoid, ball: (largest) kinetic energy in J ({EllipsoidSample.energy:g}).")
+        float | None,
+        typer.Option(help=f"ellipsoid, greedy, ball: (largest) kinetic energy in J ({EllipsoidSample.energy:g})."),
     ] = None,
     mesh: Annotated[
         Mesh | None, typer.Option(metavar=names(Mesh), help=f"ellipsoid: points on it ({EllipsoidSample.mesh}).")
+    ] = None,
+    shells: Annotated[
+        int | None,
+        typer.Option(help=f"ellipsoid: surfaces, from a quarter of its size to the whole ({EllipsoidSample.shells})."),
+    ] = None,
+    budget: Annotated[
+        float | None,
+        typer.Option(help=f"greedy: simulated seconds of all trajectories together ({GreedySample.budget:g})."),
+    ] = None,
+    mirror: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar=names(Mirror),
+            autocompletion=lambda: list(get_args(Mirror)),
+            help="greedy: mirror images count as data too, as in fit-eigen. May be given twice.",
+        ),
     ] = None,
     vehicle: VehicleOption = None,
     steps: Annotated[
         int | None,
         typer.Option(
             help=f"Steps of each trajectory (box: {BoxSample.steps}, point: {PointSample.steps}, "
-            f"ellipsoid: {EllipsoidSample.steps}, ball: {BallSample.steps})."
+            f"ellipsoid: {EllipsoidSample.steps}, greedy: {GreedySample.steps}, ball: {BallSample.steps})."
         ),
     ] = None,
     set_: SetOption = None,
@@ -93,9 +113,10 @@ def sample(
 ) -> None:
     """Draw or lay out initial states and inputs.
 
-    Kinds by kinetic energy (ellipsoid, ball) take mass and yaw inertia from the vehicle; the others are of none.
+    Kinds by kinetic energy (ellipsoid, greedy, ball) take mass and yaw inertia from the vehicle; greedy, which
+    simulates as it goes, all of it; the others are of none.
 
-    Example: koop sample ellipsoid --mesh fibonacci
+    Example: koop sample ellipsoid --mesh fibonacci --shells 6
     """
     given: Values = {
         "kind": kind,
@@ -106,6 +127,9 @@ def sample(
         "amplitude": amplitude,
         "energy": energy,
         "mesh": mesh,
+        "shells": shells,
+        "budget": budget,
+        "mirror": mirror or None,
         "steps": steps,
     }
     call = begin(store, experiment, set_, SAMPLE, {"sample": given, "vehicle": {"name": vehicle}})

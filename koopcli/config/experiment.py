@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from koopcli.checks import COMMAND_LINE, Origin, build, candidates, from_file
 from koopcli.config.data import locate
-from koopcli.config.samples import OF_VEHICLE, SAMPLES, SampleSettings
+from koopcli.config.samples import ELSEWHERE, OF_SIMULATION, OF_VEHICLE, SAMPLES, SampleSettings
 from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, PlotOptions, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, KoopError, UsageError
 from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
@@ -123,9 +123,11 @@ class Experiment:
             there = layer.values.get(section, {}).get(kind)
             table = there if isinstance(there, Mapping) else {}  # grid and box samples have a setting "box" too
             layers.append(Layer({section: {**table, **loose.get(i, {})}}, layer.origin, layer.folder))
-        if set(OF_VEHICLE) <= known:
-            body = {name: getattr(vehicle, name) for name in OF_VEHICLE}
-            layers = [Layer({section: body}, COMMAND_LINE, Path()), *layers]
+        taken: Values = {name: getattr(vehicle, name) for name in OF_VEHICLE if name in known}
+        if set(OF_SIMULATION) <= known:
+            taken = {"vehicle": vehicle, "dt": self.simulate.dt, "v_eps": self.simulate.v_eps}
+        if taken:
+            layers = [Layer({section: taken}, COMMAND_LINE, Path()), *layers]
         return _section(SAMPLES[kind], section, layers).settled()
 
 
@@ -241,9 +243,9 @@ def _check_sampled(section: str, layer: Layer) -> None:
                 where.say(f"unknown kind of {section} {misnamed!r}{candidates(str(misnamed), KINDS[section])}")
             )
         if isinstance(value, Mapping):
-            for name in OF_VEHICLE:
-                if name in value:
-                    raise where.misnamed(where.say(f"'{section}.{key}.{name}' is the vehicle's: set vehicle.{name}"))
+            for name, owner in ELSEWHERE.items():
+                if name in value and name in {f.name for f in fields(SAMPLES[key])}:
+                    raise where.misnamed(where.say(_elsewhere(f"{section}.{key}.{name}", name, owner)))
             _check_owner(f"{section}.{key}", key, value, where)
             _try_out(key, value, where, f"{section}.{key}.")
         elif key != "kind":
@@ -252,9 +254,9 @@ def _check_sampled(section: str, layer: Layer) -> None:
 
 def _check_loose(section: str, key: str, value: object, origin: Origin) -> None:
     """Refuse a setting outside any table that none of the kinds takes."""
-    known = {kind: {f.name for f in fields(SAMPLES[kind])} - {"kind", *OF_VEHICLE} for kind in KINDS[section]}
-    if key in OF_VEHICLE:
-        raise origin.misnamed(origin.say(f"'{section}.{key}' is the vehicle's: set vehicle.{key}"))
+    known = {kind: {f.name for f in fields(SAMPLES[kind])} - {"kind", *ELSEWHERE} for kind in KINDS[section]}
+    if key in ELSEWHERE:
+        raise origin.misnamed(origin.say(_elsewhere(f"{section}.{key}", key, ELSEWHERE[key])))
     owners = [kind for kind in known if key in known[kind]]
     if not owners:
         every = sorted(set().union(*known.values()))
@@ -269,9 +271,17 @@ def _check_loose(section: str, key: str, value: object, origin: Origin) -> None:
         raise refused[0]
 
 
+def _elsewhere(name: str, key: str, owner: str) -> str:
+    """What is said of a setting that a sample takes from another section."""
+    remedy = "choose it by vehicle.name" if key == owner else f"set {owner}.{key}"
+    return f"'{name}' is {'the vehicle' if owner == 'vehicle' else 'the simulation'}'s: {remedy}"
+
+
 def _try_out(kind: str, values: Mapping[str, Any], origin: Origin, prefix: str) -> None:
     """Build a sample of ``kind``, a stand-in for the vehicle that is not known yet."""
-    stand_in = {f.name: 1.0 for f in fields(SAMPLES[kind]) if f.name in OF_VEHICLE}
+    stand_in: Values = {f.name: 1.0 for f in fields(SAMPLES[kind]) if f.name in ELSEWHERE}
+    if "vehicle" in stand_in:
+        stand_in |= {"vehicle": VehicleParameters(m=1.0, Jzz=1.0, l_f=1.0, l_r=1.0, c_w=0.0, A=0.0, rho=0.0)}
     build(SAMPLES[kind], {**stand_in, **values}, origin, prefix)
 
 

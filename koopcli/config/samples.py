@@ -6,13 +6,15 @@ from dataclasses import dataclass, replace
 from typing import Literal, Self
 
 from koopcli.checks import setting
+from koopcli.config.plants import PlantName, used_of
+from koopcli.vehicles.parameters import VehicleParameters
 
-Kind = Literal["grid", "box", "point", "ellipsoid", "ball"]
+Kind = Literal["grid", "box", "point", "ellipsoid", "greedy", "ball"]
 Draw = Literal["random", "even", "chebyshev"]
 Layout = Literal["uniform", "product"]
 Mesh = Literal["sphere", "fibonacci"]
 Excitation = Literal["none", "fresh", "held"]
-PlantName = Literal["forces", "slips"]
+Mirror = Literal["left-right", "front-rear"]
 
 INPUTS = {"none": "no input", "fresh": "fresh inputs", "held": "held inputs"}  # kinds of excitation in words
 BOX = (30.0, 30.0, 10.0)
@@ -148,10 +150,57 @@ class EllipsoidSample(Sampled):
     kind: Literal["ellipsoid"] = "ellipsoid"
     mesh: Mesh = setting("sphere", help="points on the surface: latitudes × longitudes, or a spiral")
     count: int = setting(441, low=10, high=1_000_000, help="number of states; a square for the mesh 'sphere'")
-    energy: float = setting(ENERGY, above=0, high=LARGEST, unit="J", help="kinetic energy")
+    shells: int = setting(1, low=1, high=1000, help="surfaces, of radii even from a quarter to the whole")
+    energy: float = setting(ENERGY, above=0, high=LARGEST, unit="J", help="(largest) kinetic energy")
     steps: int = setting(150, low=1, high=1_000_000, help="steps of each trajectory")
     m: float
     Jzz: float
+
+    @property
+    def trajectories(self) -> int:
+        """How many trajectories start from the sample."""
+        return self.count * self.shells
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers the sample stores."""
+        return 7 * self.trajectories
+
+
+@dataclass(frozen=True, kw_only=True)
+class GreedySample(Sampled):
+    """States inside Γ, each the farthest from the data that trajectories from those before it give."""
+
+    kind: Literal["greedy"] = "greedy"
+    seed: int = setting(0, low=0, high=SEED_LIMIT, help="seed of the candidates")
+    budget: float = setting(441.0, above=0, high=1e9, unit="s", help="simulated seconds of all trajectories together")
+    steps: int = setting(100, low=1, high=1_000_000, help="steps of each trajectory")
+    usable: float = setting(0.5, above=0, high=1e6, unit="s", help="length of each trajectory that counts as data")
+    candidates: int = setting(20_000, low=1, high=10_000_000, help="states to choose from, uniform in the volume")
+    mirror: tuple[Mirror, ...] = setting((), unique=True, empty=True, help="mirror images that count as data too")
+    energy: float = setting(ENERGY, above=0, high=LARGEST, unit="J", help="largest kinetic energy")
+    vehicle: VehicleParameters
+    dt: float
+    v_eps: float
+
+    @property
+    def m(self) -> float:
+        """Mass in kg."""
+        return self.vehicle.m
+
+    @property
+    def Jzz(self) -> float:
+        """Yaw inertia in kg m²."""
+        return self.vehicle.Jzz
+
+    @property
+    def count(self) -> int:  # type: ignore[override]
+        """How many trajectories the budget pays for."""
+        return int(self.budget / (self.steps * self.dt) + 1e-9)
+
+    def settled(self) -> GreedySample:
+        """The same sample without what the plant does not use: one sample, one key."""
+        return replace(self, vehicle=used_of(self.vehicle, SAMPLED_FOR[self.kind]))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,16 +216,19 @@ class BallSample(Sampled):
     Jzz: float
 
 
-SampleSettings = GridSample | BoxSample | PointSample | EllipsoidSample | BallSample
+SampleSettings = GridSample | BoxSample | PointSample | EllipsoidSample | GreedySample | BallSample
 
 SAMPLES: dict[str, type[SampleSettings]] = {
     "grid": GridSample,
     "box": BoxSample,
     "point": PointSample,
     "ellipsoid": EllipsoidSample,
+    "greedy": GreedySample,
     "ball": BallSample,
 }
 OF_VEHICLE = ("m", "Jzz")  # what a sample by kinetic energy takes from the vehicle
+OF_SIMULATION = ("vehicle", "dt", "v_eps")  # what one that simulates takes from the simulation
+ELSEWHERE = {**dict.fromkeys(OF_VEHICLE, "vehicle"), **dict.fromkeys(OF_SIMULATION, "simulate"), "vehicle": "vehicle"}
 
 
 @dataclass(frozen=True)
@@ -198,5 +250,6 @@ SAMPLED_FOR: dict[str, PlantName] = {
     "box": "forces",
     "point": "forces",
     "ellipsoid": "slips",
+    "greedy": "slips",
     "ball": "slips",
 }

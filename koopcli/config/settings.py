@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from koopcli.checks import setting
-from koopcli.config.samples import LARGEST, SEED_LIMIT, Draw, Excitation, PlantName
+from koopcli.config.plants import UNUSED, PlantName, used_of
+from koopcli.config.samples import LARGEST, SEED_LIMIT, Draw, Excitation, Mirror
 from koopcli.vehicles.parameters import MagicFormula, VehicleParameters
 
 ForcePer = Literal["axle", "wheel"]
@@ -20,7 +21,10 @@ Terms = Literal["linear", "bilinear", "generator"]
 Placement = Literal["k-means", "drawn"]
 Solver = Literal["orthonormal", "cholesky-monomials"]
 Boundary = Literal["thin-plate", "optimal"]
-LiftName = Literal["nearest"]
+Eigenvalues = Literal["dmd", "comb", "varpro"]
+Window = Literal["trajectory", "horizon"]
+LiftName = Literal["nearest", "linear", "mls", "polyharmonic"]
+Coordinates = Literal["state", "world"]
 Scaling = Literal["raw", "extent"]
 BaselineKind = Literal["hold", "rotation", "linearisation"]
 FigureName = Literal[
@@ -57,24 +61,9 @@ class Simulate:
 
     def settled(self) -> Simulate:
         """The same simulation with everything that its plant does not use at its default."""
-        unused = UNUSED[self.plant or "forces"]
-        body = {name.partition(".")[2] for name in unused if name.startswith("vehicle.")}
-        own = {name.partition(".")[2] for name in unused if name.startswith("simulate.")}
-        vehicle = replace(self.vehicle, **{name: getattr(VehicleParameters, name) for name in body})
-        return replace(self, vehicle=vehicle, **{name: getattr(Simulate, name) for name in own})
-
-
-UNUSED: dict[str, tuple[str, ...]] = {
-    "forces": (
-        "vehicle.J_R",
-        "vehicle.r_w",
-        "vehicle.mu_scale",
-        "vehicle.lateral",
-        "vehicle.longitudinal",
-        "simulate.v_eps",
-    ),
-    "slips": ("vehicle.J_R", "vehicle.r_w", "simulate.force_per"),
-}
+        plant = self.plant or "forces"
+        own = {name.partition(".")[2] for name in UNUSED[plant] if name.startswith("simulate.")}
+        return replace(self, vehicle=used_of(self.vehicle, plant), **{name: getattr(Simulate, name) for name in own})
 
 
 @dataclass(frozen=True)
@@ -116,7 +105,19 @@ OF_BASIS: dict[str, tuple[str, ...]] = {
 class FitEigen:
     """Eigenfunctions from trajectories."""
 
-    degree: int = setting(2, low=0, high=100, help="most rates of the dynamic mode decomposition in one sum")
+    eigenvalues: Eigenvalues = setting(
+        "dmd", help="rates: sums of the data's own, a comb of frequencies, or those that a search finds from there"
+    )
+    degree: int = setting(2, low=0, high=100, help="dmd: most rates of the dynamic mode decomposition in one sum")
+    pairs: int | None = setting(
+        None, low=1, high=1000, help="comb, varpro: pairs of complex rates beside two real ones; else 10 and 6"
+    )
+    lowest: float = setting(2.0, above=0, high=1e6, unit="rad/s", help="comb, varpro: lowest frequency")
+    highest: float = setting(26.0, above=0, high=1e6, unit="rad/s", help="comb, varpro: highest frequency")
+    damping: float = setting(1.0, low=0, high=1e6, unit="1/s", help="comb, varpro: decay of all but the constant")
+    window: Window = setting(
+        "trajectory", help="what a lifted state is fitted to: the trajectory from Γ, or the horizon ahead of a sample"
+    )
     boundary: Boundary = setting("thin-plate", help="values on Γ: thin-plate splines of x0, or the best ones")
     centres: int = setting(441, low=1, high=100_000, help="thin-plate: number of splines")
     seed: int = setting(0, low=0, high=SEED_LIMIT, help="thin-plate: seed of their centres")
@@ -125,13 +126,59 @@ class FitEigen:
         None, low=0, high=0.5, help="smallest singular value kept, of the largest; else 1e-14 (thin-plate) or rounding"
     )
     tabulate: float = setting(1.0, above=0, high=1e6, unit="s", help="length of each trajectory that is looked up")
+    horizon: float | None = setting(
+        None, above=0, high=1e6, unit="s", help="window horizon: longest prediction; else what the table leaves"
+    )
     lift: LiftName = setting("nearest", help="how a state is looked up")
+    coordinates: Coordinates = setting(
+        "state", help="window horizon: what is interpolated, the states or the motion in the world"
+    )
+    neighbours: int | None = setting(None, low=1, high=10_000, help="mls, polyharmonic: nodes at a time; else 24, 60")
+    nodes: int | None = setting(
+        None, low=1, high=1_000_000, help="samples looked up of each trajectory, thinned by voxels; else all"
+    )
+    spacing: int | None = setting(
+        None, low=1, high=1_000_000, help="mls, polyharmonic: samples between neighbours on one trajectory; else any"
+    )
+    radial_power: float = setting(
+        1.0, above=0, high=10, help="distances: power of the distance from standstill; below 1 the middle is spread out"
+    )
+    mirror: tuple[Mirror, ...] = setting((), unique=True, empty=True, help="mirror images that are data too")
+    rounds: int = setting(
+        0, low=0, high=100, help="window horizon: how often short trajectories are continued by the predictor itself"
+    )
+    trust: bool = setting(False, help="window horizon: estimate errors from data held back")
 
     def settled(self) -> FitEigen:
-        """The same fit with the cut written out, and without what the boundary functions do not use."""
-        if self.boundary == "thin-plate":
-            return self if self.cut is not None else replace(self, cut=1e-14)
-        return replace(self, centres=FitEigen.centres, seed=FitEigen.seed, scaling=FitEigen.scaling)
+        """The same fit with what is left open written out, and without what another setting switches off."""
+        idle = {name: getattr(FitEigen, name) for name in self.idle()}
+        found = replace(self, **{**idle, **({"boundary": "optimal"} if "boundary" in idle else {})})
+        if found.boundary == "thin-plate" and found.cut is None:
+            found = replace(found, cut=1e-14)
+        if found.eigenvalues in PAIRS and found.pairs is None:
+            found = replace(found, pairs=PAIRS[found.eigenvalues])
+        if found.lift in NEIGHBOURS and found.neighbours is None:
+            found = replace(found, neighbours=NEIGHBOURS[found.lift])
+        return found
+
+    def idle(self) -> dict[str, str]:
+        """The settings that have no effect, each with the one that switches it off."""
+        spline = ("centres", "seed", "scaling")
+        off: dict[str, str] = {}
+        if self.window == "horizon":
+            off |= dict.fromkeys(("boundary", *spline), "window")
+        else:
+            off |= dict.fromkeys(("horizon", "coordinates", "rounds", "trust"), "window")
+            if self.boundary == "optimal":
+                off |= dict.fromkeys(spline, "boundary")
+        off |= dict.fromkeys(
+            ("degree",) if self.eigenvalues in PAIRS else ("pairs", "lowest", "highest", "damping"), "eigenvalues"
+        )
+        return off if self.lift in NEIGHBOURS else {**off, "neighbours": "lift", "spacing": "lift"}
+
+
+PAIRS = {"comb": 10, "varpro": 6}  # of complex rates, unless told otherwise
+NEIGHBOURS = {"mls": 24, "polyharmonic": 60}  # at a time, unless told otherwise
 
 
 @dataclass(frozen=True)
@@ -151,6 +198,7 @@ class Evaluate:
         None, low=0, high=1_000_000, help="first scored sample; else 1 for the plant 'forces' and 0 for 'slips'"
     )
     chunk: int = setting(2048, low=1, high=100_000_000, help="trajectories for each committed part")
+    relift: bool = setting(True, help="score predictions that are lifted afresh at every step too")
     restart: int | None = setting(
         None, low=1, high=1_000_000, help="steps until a prediction starts afresh from the true state; else never"
     )
@@ -218,4 +266,21 @@ class Reproduce:
     )
     beside: tuple[str, ...] = setting(
         ("rimac-2018",), unique=True, empty=True, help="eigen: vehicles shown beside the main one"
+    )
+    unseen: tuple[str, ...] = setting(
+        ("efremov-2020", "bmw-320i"),
+        unique=True,
+        empty=True,
+        help="beyond: vehicles for the best fit alone",
+    )
+    pairs: tuple[int, ...] = setting(
+        (1, 2, 3, 4, 6, 8, 10), low=1, high=1000, unique=True, help="beyond: pairs of rates of the mode sweep"
+    )
+    budgets: tuple[float, ...] = setting(
+        (441.0, 100.0, 2000.0),
+        above=0,
+        high=1e9,
+        unique=True,
+        unit="s",
+        help="beyond: simulated seconds, the main first",
     )

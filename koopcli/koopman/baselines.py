@@ -37,6 +37,10 @@ class Forecast:
         """Whether inputs move the prediction at all."""
         return self.kind == "linearisation"
 
+    def bound(self, x: FloatArray) -> FloatArray | None:
+        """Nothing is known of its errors."""
+        return None
+
     def predict(self, x0: FloatArray, u: FloatArray) -> FloatArray:
         """States (n, steps+1, n_x) from ``x0`` (n, n_x) under ``u`` (n, steps, n_u)."""
         return FORECASTS[self.kind](self, x0, u)

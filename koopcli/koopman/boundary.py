@@ -15,8 +15,8 @@ from koopcli.records import FloatArray
 class Solution:
     """Lifted initial states ``starts`` (J, copies, L or 1) and ``C`` (n_x, copies · L), with the regression's numbers.
 
-    ``rank`` of ``directions`` were kept; ``condition`` is the largest over the smallest singular value before the cut. ``missed``: the share of the
-    trajectories, in percent, that the fit does not hold.
+    ``rank`` of ``directions`` were kept; ``condition`` is the largest over the smallest singular value before the cut;
+    ``missed``: the share of the trajectories, in percent, that the fit does not hold.
     """
 
     starts: FloatArray

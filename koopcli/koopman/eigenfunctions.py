@@ -30,8 +30,8 @@ class Reading:
     ahead; ``boundary`` functions ``thin-plate`` (with ``centres`` drawn from ``seed``, in ``raw`` units or scaled by
     the ``extent`` of the data) or ``optimal``; ``cut``: smallest singular value kept, relative to the largest, working
     precision if None; ``tabulated`` steps of each trajectory are looked up, and predictions reach ``horizon`` steps.
-    ``lift``, ``power``, ``neighbours``, ``nodes``: see ``nodes.Search``; ``frame`` in which futures are interpolated;
-    ``rounds`` of continuing trajectories that are too short for their table; ``trust``: estimate errors too.
+    ``lift``, ``power``, ``neighbours``, ``nodes``, ``spacing``: see ``nodes.Search``; ``frame`` in which futures are
+    interpolated; ``rounds`` of continuing trajectories that are too short for their table; ``trust``: estimate errors.
     """
 
     spectrum: Spectrum
@@ -48,6 +48,7 @@ class Reading:
     power: float
     neighbours: int | None
     nodes: int | None
+    spacing: int | None
     rounds: int
     trust: bool
 
@@ -156,7 +157,7 @@ def _search(reading: Reading, x: FloatArray) -> Search:
     size = np.abs(x).max(axis=(0, 1))
     raw = reading.lift == "nearest" and reading.power == 1.0
     scale = np.ones(x.shape[2]) if raw else np.where(size > 0, size, 1.0)
-    return Search(reading.lift, scale, reading.power, reading.neighbours, reading.nodes)
+    return Search(reading.lift, scale, reading.power, reading.neighbours, reading.nodes, reading.spacing)
 
 
 def _cut(reading: Reading, samples: int) -> float:

@@ -42,6 +42,9 @@ class Forecaster(Protocol):
     def input_channels(self) -> Channels:
         """Names and units of u."""
 
+    def bound(self, x: FloatArray) -> FloatArray | None:
+        """What it says the error in percent from ``x`` (n, n_x) stays below, (n,), if it says so at all."""
+
     def predict(self, x0: FloatArray, u: FloatArray) -> FloatArray:
         """States (n, steps+1, n_x) from ``x0`` (n, n_x) under ``u`` (n, steps, n_u)."""
 
@@ -54,10 +57,11 @@ class Evaluation:
     """Scores of n trajectories: ``rmse``, ``rmse_printed``, ``rmse_relift`` (n,) in percent, and ``start_error`` (n,),
     that of the prediction at k = 0 alone; ``max_error`` (n, n_x) the largest error of each state; ``in_domain`` (n,)
     the share of true samples inside the training box; ``distance`` (n,) of x0 to the training states in half-widths
-    of that box, ``outside`` (n,) whether x0 lies outside their convex hull; ``diverged`` and ``diverged_relift`` (n,)
-    of the two kinds of prediction; ``x0`` (n, n_x). A diverged prediction keeps its row and stays out of the figures
-    of its kind. With predictions that ``restart`` every so many steps each has a row, and ``start`` (n,) is the sample
-    it starts from; ``steps`` is then the longest of them.
+    of that box, ``outside`` (n,) whether x0 lies outside their convex hull; ``bound`` (n,) in percent what the
+    predictor's own estimate says ``rmse`` stays below, not a number where it has none; ``diverged`` and
+    ``diverged_relift`` (n,) of the two kinds of prediction; ``x0`` (n, n_x). A diverged prediction keeps its row and
+    stays out of the figures of its kind. With predictions that ``restart`` every so many steps each has a row, and
+    ``start`` (n,) is the sample it starts from; ``steps`` is then the longest of them.
     """
 
     x0: FloatArray
@@ -69,6 +73,7 @@ class Evaluation:
     in_domain: FloatArray
     distance: FloatArray
     outside: BoolArray
+    bound: FloatArray
     diverged: BoolArray
     diverged_relift: BoolArray
     start: IndexArray
@@ -101,8 +106,17 @@ class Evaluation:
             "outside": int(self.outside.sum()),
             "worst_in_emptiest": metrics.overlap_of_largest(self.rmse[valid], self.distance[valid]),
             "functions": self.functions,
+            "bound": self._bound(),
             **({} if self.restart is None else {"restart": self.restart, "segments": self._segments()}),
         }
+
+    def _bound(self) -> Meta | None:
+        """How many errors stay below the bounds given for them, and how large these are."""
+        given = np.isfinite(self.bound) & np.isfinite(self.rmse)
+        if not given.any():
+            return None
+        below = (self.rmse <= self.bound) & ~self.diverged
+        return {"covered": float(below[given].mean()), **metrics.summary(self.bound[given])}
 
     def _segments(self) -> list[Meta]:
         """The mean RMSE of the predictions that start from each sample."""
@@ -118,9 +132,16 @@ class Evaluation:
         header = [f"{name}_0 ({unit})" for name, unit in states]
         header += ["rmse (%)", "rmse_printed (%)", "rmse_relift (%)", "start_error (%)"]
         header += [f"max_error {name} ({unit})" for name, unit in states]
-        header += ["in_domain (1)", "distance (half-widths)", "outside (1)", "diverged (1)", "diverged_relift (1)"]
+        header += [
+            "in_domain (1)",
+            "distance (half-widths)",
+            "outside (1)",
+            "bound (%)",
+            "diverged (1)",
+            "diverged_relift (1)",
+        ]
         columns: list[Any] = [self.x0, self.rmse, self.rmse_printed, self.rmse_relift, self.start_error, self.max_error]
-        columns += [self.in_domain, self.distance, self.outside, self.diverged, self.diverged_relift]
+        columns += [self.in_domain, self.distance, self.outside, self.bound, self.diverged, self.diverged_relift]
         if self.restart is not None:
             header, columns = ["start (samples)", *header], [self.start, *columns]
         return header, np.column_stack(columns).tolist()
@@ -139,6 +160,7 @@ class Evaluation:
             "in_domain": Array(self.in_domain, row, "1"),
             "distance": Array(self.distance, row, "1"),
             "outside": Array(self.outside, row, "1"),
+            "bound": Array(self.bound, row, "%"),
             "diverged": Array(self.diverged, row, "1"),
             "diverged_relift": Array(self.diverged_relift, row, "1"),
             "start": Array(self.start, row, "samples"),
@@ -161,32 +183,40 @@ class Evaluation:
 
 
 def evaluate(
-    predictor: Forecaster, trajectories: Trajectories, rows: slice, first: int, restart: int | None = None
+    predictor: Forecaster,
+    trajectories: Trajectories,
+    rows: slice,
+    first: int,
+    restart: int | None = None,
+    relift: bool = True,
 ) -> Evaluation:
     """Score ``predictor`` on the trajectories ``rows``, samples k = ``first`` .. steps.
 
     With ``restart`` a prediction starts afresh from the true state every so many steps, and each is scored from the
-    ``first`` sample after its start; rows run by trajectory, then by start. Raises ``InvalidValueError`` when states,
-    inputs or sampling period differ from the predictor's.
+    ``first`` sample after its start; rows run by trajectory, then by start. Without ``relift`` there is no score of
+    that kind. Raises ``InvalidValueError`` when states, inputs or sampling period differ from the predictor's.
     """
     _check(predictor, trajectories, first, restart)
     x, u = np.asarray(trajectories.x[rows]), np.asarray(trajectories.u[rows])
     every = restart or trajectories.steps
     starts = range(0, trajectories.steps, every)
-    parts = [_score(predictor, x[:, k : k + every + 1], u[:, k : k + every], first, k) for k in starts]
+    parts = [_score(predictor, x[:, k : k + every + 1], u[:, k : k + every], first, k, relift) for k in starts]
     order = np.argsort(np.tile(np.arange(len(x)), len(parts)), kind="stable")
     steps = min(every, trajectories.steps)
     return replace(_reordered(join(parts), order), restart=restart, steps=steps)
 
 
-def _score(predictor: Forecaster, x: FloatArray, u: FloatArray, first: int, start: int) -> Evaluation:
+def _score(
+    predictor: Forecaster, x: FloatArray, u: FloatArray, first: int, start: int, lifted_afresh: bool
+) -> Evaluation:
     """The scores of one prediction for each of ``x`` (n, steps+1, n_x) under ``u`` (n, steps, n_u)."""
-    domain = predictor.coverage.domain
+    domain, bound = predictor.coverage.domain, predictor.bound(x[:, 0])
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging prediction is a result, not an accident
         once = predictor.predict(x[:, 0], u)
         relift = np.empty_like(once)
         relift[:, 0], at = once[:, 0], x[:, 0]  # the first step starts from the state that is known
-        for k in range(u.shape[1]):
+        relift[:, 1:] = np.nan
+        for k in range(u.shape[1] if lifted_afresh else 0):
             relift[:, k + 1] = at = predictor.step(at, u[:, k])
         scored = slice(first, None)
         return Evaluation(
@@ -199,8 +229,9 @@ def _score(predictor: Forecaster, x: FloatArray, u: FloatArray, first: int, star
             in_domain=metrics.in_domain(x[:, scored], domain),
             distance=predictor.coverage.distance(x[:, 0]),
             outside=predictor.coverage.outside(x[:, 0]),
+            bound=np.full(len(x), np.nan) if bound is None else bound,
             diverged=metrics.diverged(once[:, scored], domain),
-            diverged_relift=metrics.diverged(relift[:, scored], domain),
+            diverged_relift=metrics.diverged(relift[:, scored], domain) & lifted_afresh,
             start=np.full(len(x), start),
             steps=u.shape[1],
             first=first,

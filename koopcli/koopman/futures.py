@@ -9,11 +9,13 @@ import numpy as np
 
 from koopcli.koopman.frames import FRAMES
 from koopcli.koopman.lifts import Observed
-from koopcli.koopman.modes import Modes
+from koopcli.koopman.modes import IndexArray, Modes
 from koopcli.koopman.nodes import Nodes
 from koopcli.records import Array, FloatArray, Packed
 
 TOGETHER = 4096  # states lifted at once
+LARGEST_TABLE = 3e8  # bytes of what follows all nodes; a larger one is not made
+GATHERED = 128  # states whose nodes' futures are then put together at once
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Futures:
     def lift(self, x: FloatArray) -> FloatArray:
         """ψ(x) (n, N) of the states (n, n_x)."""
         blocks = np.matmul(self.projection, self.future(x))  # (n, L, n_x)
-        return blocks.transpose(0, 2, 1).reshape(len(x), self.functions)
+        return np.asarray(blocks.transpose(0, 2, 1).reshape(len(x), self.functions))
 
     def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
         """rows · ψ(x) as (n, R), for ``rows`` (R, N)."""
@@ -67,17 +69,35 @@ class Futures:
         from scipy.sparse import csr_matrix  # noqa: PLC0415  (what only reads a predictor goes without)
 
         indices, weights = self.nodes.find(x)
+        if self._table_bytes > LARGEST_TABLE:
+            return self._gathered(indices, weights)
         ends = np.arange(len(x) + 1) * indices.shape[1]
         table = csr_matrix((weights.ravel(), indices.ravel(), ends), shape=(len(x), len(self._values)))
         return np.asarray(table @ self._values)
 
+    def _gathered(self, indices: IndexArray, weights: FloatArray) -> FloatArray:
+        """The same where a table of all nodes would be too large: what follows those that are found."""
+        found = np.empty((len(indices), self.projection.shape[1] * self.trajectories.shape[2]))
+        for start in range(0, len(indices), GATHERED):
+            rows = slice(start, start + GATHERED)
+            values = self._values_of(indices[rows].ravel()).reshape(*indices[rows].shape, -1)
+            found[rows] = np.matmul(weights[rows, np.newaxis], values)[:, 0]
+        return found
+
+    @property
+    def _table_bytes(self) -> float:
+        return 8.0 * len(self.nodes.kept) * self.projection.shape[1] * float(self.trajectories.shape[2])
+
     @cached_property
     def _values(self) -> FloatArray:
         """What follows every node, in the frame, (nodes, samples · n_x)."""
-        samples = self.projection.shape[1]
-        j, k = self.nodes.trajectory, self.nodes.sample
-        ahead = self.trajectories[j[:, np.newaxis], k[:, np.newaxis] + np.arange(samples)]
-        return FRAMES[self.frame].seen(ahead, self.modes.dt).reshape(len(j), -1)
+        return self._values_of(np.arange(len(self.nodes.kept)))
+
+    def _values_of(self, nodes: IndexArray) -> FloatArray:
+        """What follows some ``nodes`` (m,), (m, samples · n_x)."""
+        j, k = self.nodes.trajectory[nodes], self.nodes.sample[nodes]
+        ahead = self.trajectories[j[:, np.newaxis], k[:, np.newaxis] + np.arange(self.projection.shape[1])]
+        return np.asarray(FRAMES[self.frame].seen(ahead, self.modes.dt).reshape(len(j), -1))
 
     def pack(self) -> Packed:
         """Trajectories, nodes and projection."""

@@ -7,7 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from koopcli.koopman.lookup import Lookup, check_nodes, lookup, search
+from koopcli.koopman.lookup import LOOKUPS, Lookup, check_nodes, search
+from koopcli.koopman.lookup.cloud import Cloud
 from koopcli.koopman.modes import IndexArray
 from koopcli.records import Array, FloatArray, Meta, Packed
 
@@ -19,8 +20,8 @@ TINY = 1e-12
 
 @dataclass(frozen=True)
 class Search:
-    """How nodes are looked up: ``kind`` of ``LOOKUPS``, with how many ``neighbours`` (None: as the kind has it), of
-    how many ``nodes`` kept for each trajectory (None: all).
+    """How nodes are looked up: ``kind`` of ``LOOKUPS``, with how many ``neighbours`` (None: as the kind has it) and
+    their ``spacing`` (see ``Cloud``), of how many ``nodes`` kept for each trajectory (None: all).
 
     Distances are between places y |y|^(power - 1) with y = x / scale: a ``power`` below one spreads out the middle.
     """
@@ -30,6 +31,7 @@ class Search:
     power: float = 1.0
     neighbours: int | None = None
     nodes: int | None = None
+    spacing: int | None = None
 
     def place(self, x: FloatArray) -> FloatArray:
         """Where the states ``x`` (n, n_x) lie, (n, n_x), eq. (7.12)."""
@@ -71,7 +73,9 @@ class Nodes:
 
     @cached_property
     def _lookup(self) -> Lookup:
-        return lookup(self.search.kind, self.search.place(self.states), self.search.neighbours)
+        how, places = self.search, self.search.place(self.states)
+        neighbours = check_nodes(how.kind, places, how.neighbours)
+        return LOOKUPS[how.kind].make(Cloud(places, self.trajectory, self.sample, neighbours, how.spacing))
 
     def pack(self) -> Packed:
         """The nodes for storage, by number: their states are with the trajectories."""
@@ -90,6 +94,7 @@ class Nodes:
             "power": s.power,
             "neighbours": s.neighbours,
             "nodes": s.nodes,
+            "spacing": s.spacing,
             "samples": self.samples,
         }
 
@@ -98,7 +103,7 @@ class Nodes:
         """The inverse of :meth:`pack`, of ``trajectories`` (J, samples or more, n_x)."""
         meta = packed.meta
         scale, kept = packed.arrays["scale"].values[...], packed.arrays["nodes"].values[...]
-        how = Search(meta["kind"], scale, meta["power"], meta["neighbours"], meta["nodes"])
+        how = Search(meta["kind"], scale, meta["power"], meta["neighbours"], meta["nodes"], meta["spacing"])
         j, k = np.divmod(kept, meta["samples"])
         return cls(how, trajectories[j, k], kept, meta["samples"])
 

@@ -13,9 +13,9 @@ from koopcli.errors import InvalidValueError
 from koopcli.koopman import responses
 from koopcli.koopman.bases import STORED
 from koopcli.koopman.coverage import Coverage
+from koopcli.koopman.futures import Futures
 from koopcli.koopman.lifts import Lift, Observed
 from koopcli.koopman.modes import Modes
-from koopcli.koopman.futures import Futures
 from koopcli.koopman.tabulated import Tabulated
 from koopcli.koopman.trust import Trust
 from koopcli.records import Array, Channels, FloatArray, Meta, Packed

@@ -42,6 +42,7 @@ class Spectrum:
 
 Windows = Sequence[FloatArray]  # (J, samples, n_x) each, of one length
 
+
 def dmd_rates(x: FloatArray, dt: float) -> ComplexArray:
     """The rates log(eig)/dt in 1/s of the best linear map x_k → x_{k+1} over ``x`` (J, samples, n_x), eq. (7.3).
 
@@ -111,7 +112,7 @@ def searched(x: Windows, dt: float, spectrum: Spectrum) -> ComplexArray:
     pairs, single = start[: 2 * spectrum.pairs : 2], start[2 * spectrum.pairs :]
     count = spectrum.pairs
     gram = _gram(x)
-    t = dt * np.arange(len(gram))
+    t: FloatArray = dt * np.arange(float(len(gram)))
 
     def left(values: FloatArray) -> tuple[float, FloatArray]:
         rates = _assembled(values, count)

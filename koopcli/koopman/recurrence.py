@@ -11,6 +11,7 @@ from koopcli.errors import InvalidValueError
 from koopcli.records import FloatArray
 
 ONE_LEVEL = 1e-6  # relative spread of the energies of states that count as one level
+SHARED = 10  # initial states of each level at least, where levels are surfaces
 TOUCH = 1e-3  # of the distance between two samples: a start nearer to the path than that lies on it
 NEAR = 0.1  # of the same: a start within so much more than half of it from its middle is looked at closely
 TINY = 1e-300
@@ -47,18 +48,20 @@ def check_starts(x: FloatArray) -> int:
     return int((like != np.arange(len(x))).sum())
 
 
-def check_recurrence(x: FloatArray, dt: float, surface: Surface | None = None) -> bool:
+def check_recurrence(x: FloatArray, dt: float, surface: Surface | None = None) -> int | None:
     """Raise ``InvalidValueError`` where trajectories ``x`` (J, samples, n_x) come back to their initial states (7.9).
 
-    Initial states of one energy are a closed ``surface`` that every trajectory must leave at once and stay inside of;
-    whether that could be checked is returned. In any case no path may lead through an initial state.
+    Initial states of one energy, or of a few, are closed surfaces; every trajectory must leave its own at once and stay
+    inside of it. How many there are is returned, or None where the states lie on none. In any case no path may lead
+    through an initial state.
     """
-    one_level = False
+    levels = None
     if surface is not None:
-        level = surface.energy(x[:, 0])
-        one_level = bool(np.ptp(level) <= ONE_LEVEL * level.max())
-        if one_level:
+        level = np.sort(surface.energy(x[:, 0]))
+        count = 1 + int((np.diff(level) > ONE_LEVEL * level.max()).sum())
+        if count == 1 or count * SHARED <= len(x):
             _stay_below(x, dt, surface)
+            levels = count
     found = _passes_a_start(x)
     if found is not None:
         raise InvalidValueError(
@@ -66,7 +69,7 @@ def check_recurrence(x: FloatArray, dt: float, surface: Surface | None = None) -
             f"{found.start}, {_text(x[found.start, 0])}: eigenfunctions need initial states that no trajectory returns "
             "to; shorten the trajectories or choose other initial states"
         )
-    return one_level
+    return levels
 
 
 def _stay_below(x: FloatArray, dt: float, surface: Surface) -> None:

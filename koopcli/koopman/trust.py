@@ -105,7 +105,7 @@ def held_back(
 
 
 def calibrated(x: FloatArray, error: FloatArray, scale: FloatArray, power: float) -> Trust:
-    """The estimate from ``error`` (m,) in percent at the states ``x`` (m, n_x), its factor found by leaving each out."""
+    """The estimate from ``error`` (m,) in percent at ``x`` (m, n_x), with a factor found by leaving each out."""
     trust = Trust(x, error, scale, power, 1.0)
     count = _neighbours(len(x) - 1)
     near = trust._tree.query(trust._search.place(x), count + 1)[1][:, 1:]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from koopcli.config.experiment import Experiment
-from koopcli.config.settings import UNUSED
+from koopcli.config.plants import UNUSED
 from koopcli.records import Meta
 from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline

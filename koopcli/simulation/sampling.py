@@ -10,6 +10,8 @@ import numpy as np
 from koopcli.errors import InvalidValueError
 from koopcli.records import FloatArray
 
+SMALLEST_SHELL = 0.25  # radius of the innermost of several
+
 Draw = Callable[[np.random.Generator, float, int], FloatArray]
 
 
@@ -78,6 +80,12 @@ def check_mesh(mesh: str, count: int) -> None:
 def semi_axes(energy: float, m: float, Jzz: float) -> FloatArray:
     """Largest v_x, v_y, yaw rate (3,) of a body of mass ``m`` and yaw inertia ``Jzz`` with the kinetic ``energy``."""
     return np.sqrt(2 * energy / np.array([m, m, Jzz]))
+
+
+def shells(points: FloatArray, count: int) -> FloatArray:
+    """The ``points`` (n, 3) of the unit sphere on ``count`` surfaces of even radii, the outermost first."""
+    radii = np.linspace(1, SMALLEST_SHELL, count) if count > 1 else np.ones(1)
+    return np.concatenate([radius * points for radius in radii])
 
 
 MESHES: dict[str, Callable[[int], FloatArray]] = {"sphere": sphere_mesh, "fibonacci": fibonacci_mesh}

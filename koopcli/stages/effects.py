@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from koopcli.config.experiment import Experiment
-from koopcli.config.samples import OF_VEHICLE
-from koopcli.config.settings import UNUSED, FitEdmd, FitEigen
+from koopcli.config.plants import UNUSED
+from koopcli.config.samples import OF_VEHICLE, SAMPLED_FOR, GreedySample
 from koopcli.stages.base import Task
 
 
@@ -51,6 +51,7 @@ def _idle_sample(section: str, key: str, tasks: Sequence[Task], behind: Sequence
 def _idle_in_plants(name: str, key: str, tasks: Sequence[Task], behind: Sequence[Task]) -> str | None:
     """Of a setting of the vehicle or of its simulation."""
     plants = {step.settings.plant for step in behind if step.stage == "simulate"}
+    plants |= {SAMPLED_FOR[step.settings.kind] for step in behind if isinstance(step.settings, GreedySample)}
     by_energy = any(
         key in (*OF_VEHICLE, "name") and hasattr(step.settings, OF_VEHICLE[0])
         for step in behind
@@ -66,15 +67,13 @@ def _idle_in_plants(name: str, key: str, tasks: Sequence[Task], behind: Sequence
 
 def _idle_in_fit(section: str, key: str, experiment: Experiment) -> str | None:
     """Of a setting of a fit that another one switches off."""
-    fits: dict[str, tuple[FitEdmd | FitEigen, str]] = {
-        "fit-edmd": (experiment.fit_edmd, "basis"),
-        "fit-eigen": (experiment.fit_eigen, "boundary"),
-    }
-    if section not in fits:
-        return None
-    settings, chosen = fits[section]
-    idle = getattr(settings.settled(), key) != getattr(settings, key)
-    return f"{section}.{chosen} '{getattr(settings, chosen)}' has no use for it" if idle else None
+    if section == "fit-edmd":
+        fit, chosen = experiment.fit_edmd, "basis"
+        idle = getattr(fit.settled(), key) != getattr(fit, key)
+        return f"{section}.{chosen} '{fit.basis}' has no use for it" if idle else None
+    if section == "fit-eigen" and key in (off := experiment.fit_eigen.idle()):
+        return f"{section}.{off[key]} '{getattr(experiment.fit_eigen, off[key])}' has no use for it"
+    return None
 
 
 def _samples(behind: Sequence[Task]) -> set[Task]:

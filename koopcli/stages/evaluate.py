@@ -23,7 +23,7 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
     first = settings.first
 
     def score(rows: slice) -> Packed:
-        return evaluate(predictor, trajectories, rows, first, settings.restart).pack()
+        return evaluate(predictor, trajectories, rows, first, settings.restart, settings.relift).pack()
 
     parts = context.chunks(len(trajectories), settings.chunk, score)
     result = join([Evaluation.unpack(part) for part in parts])
@@ -48,7 +48,7 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
     if figures["outside"]:
         context.warn(
             f"{figures['outside']} of {n} test states lie outside the data, the convex hull of the training states: "
-            "predictions from there are extrapolation"
+            f"predictions from there {getattr(predictor, 'beyond', 'follow the same rule')}"
         )
     return result
 
@@ -67,9 +67,12 @@ def _at(plant: Meta, name: str) -> Any:
 def _describe(figures: Meta) -> str:
     score = figures["rmse"]
     emptiest = 100 * figures["worst_in_emptiest"]
+    bound = figures["bound"]
+    trust = f"; {100 * bound['covered']:.1f} % of the errors within their 90 % bounds" if bound else ""
     return (
         f"RMSE mean {score['mean']:.4g} ± {score['std']:.3g} %, median {score['median']:.4g} %, "
         f"max {score['max']:.4g} %; of the worst 5 % of states {emptiest:.0f} % lie in the emptiest 5 % of the data"
+        f"{trust}"
     )
 
 
@@ -103,7 +106,7 @@ def _estimate(task: Task) -> Cost:
 
 STAGE = Stage(
     name="evaluate",
-    version=3,
+    version=4,
     settings=lambda values: build(Evaluate, values),
     run=_run,
     unpack=Evaluation.unpack,

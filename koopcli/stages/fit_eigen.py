@@ -8,16 +8,25 @@ import numpy as np
 
 from koopcli.checks import build
 from koopcli.config.samples import BoxSample, GridSample, PointSample, SampleSettings
-from koopcli.config.settings import FitEigen
+from koopcli.config.settings import PAIRS, FitEigen
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import eigenfunctions
+from koopcli.koopman.eigenfunctions import Reading
+from koopcli.koopman.frames import check_frame
+from koopcli.koopman.futures import Futures
+from koopcli.koopman.metrics import summary
 from koopcli.koopman.modes import Modes
 from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.rates import Spectrum
 from koopcli.koopman.recurrence import Surface, check_recurrence, check_starts
+from koopcli.koopman.tabulated import Tabulated
 from koopcli.records import FloatArray, Meta, Trajectories
 from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task, refuse_beyond_memory
 from koopcli.stages.predictors import describe, figures
 from koopcli.vehicles.plants import PLANTS, remembered_plant
+from koopcli.vehicles.symmetry import images
+
+SEVERAL = "where trajectories from several energies meet, an eigenfunction has several values, and the lift blends them"
 
 
 def _run(settings: FitEigen, inputs: Inputs, context: Context) -> Predictor:
@@ -26,27 +35,58 @@ def _run(settings: FitEigen, inputs: Inputs, context: Context) -> Predictor:
     x = eigenfunctions.autonomous(trajectories)
     _check_surface(x, trajectories, context)
     context.progress(1, 2)
-    return eigenfunctions.fit(
-        replace(trajectories, x=x),  # not read again
-        degree=settings.degree,
-        boundary=settings.boundary,
-        centres=settings.centres,
-        seed=settings.seed,
-        scaling=settings.scaling,
-        cut=settings.cut,
-        tabulated=_tabulated(settings, trajectories.dt),
-        lift=settings.lift,
+    trajectories = replace(trajectories, x=x)  # not read again
+    signs = images(settings.mirror, remembered_plant(trajectories.plant).parameters) if settings.mirror else []
+    complete = eigenfunctions.with_images(trajectories, signs)
+    return eigenfunctions.fit(complete, reading(settings, trajectories.steps, trajectories.dt), 1 + len(signs))
+
+
+def reading(settings: FitEigen, steps: int, dt: float) -> Reading:
+    """The settings of a fit in steps of ``dt`` s, of trajectories of so many ``steps``."""
+    s = settings
+    tabulated = _whole("tabulate", s.tabulate, dt)
+    horizon = steps - tabulated if s.horizon is None else _whole("horizon", s.horizon, dt)
+    assert s.pairs is not None or s.eigenvalues == "dmd", "settled"
+    return Reading(
+        spectrum=Spectrum(s.eigenvalues, s.degree, s.pairs or 0, s.lowest, s.highest, s.damping),
+        window=s.window,
+        boundary=s.boundary,
+        centres=s.centres,
+        seed=s.seed,
+        scaling=s.scaling,
+        cut=s.cut,
+        tabulated=tabulated,
+        horizon=horizon,
+        lift=s.lift,
+        frame=s.coordinates,
+        power=s.radial_power,
+        neighbours=s.neighbours,
+        nodes=s.nodes,
+        spacing=s.spacing,
+        rounds=s.rounds,
+        trust=s.trust,
     )
 
 
 def _figures(predictor: Predictor) -> Meta:
-    modes = predictor.A
+    modes, lift, trust = predictor.A, predictor.observables, predictor.trust
     assert isinstance(modes, Modes)
-    return {**figures(predictor), "rates": modes.rates.real.tolist(), "frequencies": modes.rates.imag.tolist()}
+    assert isinstance(lift, (Tabulated, Futures))
+    return {
+        **figures(predictor),
+        "rates": modes.rates.real.tolist(),
+        "frequencies": modes.rates.imag.tolist(),
+        "modes": len(modes.rates),
+        "missed": predictor.missed,
+        "nodes": len(lift.nodes.kept),
+        "trust": None if trust is None else {"level": trust.level, **summary(trust.errors)},
+    }
 
 
 def _describe(figures: Meta) -> str:
-    found = describe(figures)
+    found = f"{describe(figures)}; {figures['modes']} modes miss {figures['missed']:.3g} % of the data"
+    if figures["trust"] is not None:
+        found += f"; where data were held back, errors are {figures['trust']['median']:.3g} % in the median"
     if figures["rank"] < figures["directions"]:
         found += f"; the errors depend on the cut, which keeps {figures['rank']} directions"
     return found
@@ -63,19 +103,22 @@ def _check_surface(x: FloatArray, trajectories: Trajectories, context: Context) 
     if trajectories.plant:
         plant, u = remembered_plant(trajectories.plant), np.asarray(trajectories.u[0])[:1]
         surface = Surface(plant.kinetic_energy, lambda states: plant.rhs(states, np.repeat(u, len(states), axis=0)))
-    if not check_recurrence(x, trajectories.dt, surface):
+    levels = check_recurrence(x, trajectories.dt, surface)
+    if levels is None:
         context.warn(
             "the initial states are no surface of one kinetic energy, so that trajectories may lead through it again "
-            "was only checked at these states themselves"
+            f"was only checked at these states themselves; {SEVERAL}"
         )
+    elif levels > 1:
+        context.warn(f"no trajectory comes back to its own one of the {levels} surfaces of kinetic energy; {SEVERAL}")
 
 
-def _tabulated(settings: FitEigen, dt: float) -> int:
-    """Steps of each trajectory that are looked up."""
-    steps = settings.tabulate / dt
+def _whole(name: str, seconds: float, dt: float) -> int:
+    """A time in steps."""
+    steps = seconds / dt
     if abs(steps - round(steps)) > 1e-6 * steps or round(steps) < 1:
         raise InvalidValueError(
-            f"'fit-eigen.tabulate' must be a whole number of sampling periods of {dt:g} s, got {settings.tabulate:g} s"
+            f"'fit-eigen.{name}' must be a whole number of sampling periods of {dt:g} s, got {seconds:g} s"
         )
     return round(steps)
 
@@ -90,10 +133,19 @@ def _check(task: Task) -> None:
         )
     if simulation is None:
         return
-    plant, steps = simulation.settings, simulation.settings.steps
+    plant, fit = simulation.settings, task.settings
+    found = reading(fit, plant.steps, plant.dt)
+    if fit.eigenvalues in PAIRS and fit.pairs > 1 and fit.lowest >= fit.highest:
+        raise InvalidValueError(
+            f"'fit-eigen.lowest' {fit.lowest:g} rad/s must be below 'fit-eigen.highest' {fit.highest:g} rad/s"
+        )
+    if fit.rounds and fit.horizon is None:
+        raise InvalidValueError("'fit-eigen.rounds' continues trajectories over the horizon: set fit-eigen.horizon too")
+    eigenfunctions.check_window(plant.steps, found, plant.dt)
     n_x = len(PLANTS[plant.plant].states)
-    eigenfunctions.check_window(steps, _tabulated(task.settings, plant.dt), plant.dt)
-    eigenfunctions.check_modes(eigenfunctions.lattice_size(n_x, task.settings.degree), steps)
+    eigenfunctions.check_modes(found.spectrum.count(n_x), found.horizon if fit.window == "horizon" else plant.steps)
+    check_frame(fit.coordinates, PLANTS[plant.plant].states)
+    images(fit.mirror, plant.vehicle)
     if sample is not None:
         splines = 32.0 * sample.settings.trajectories * task.settings.centres  # distances, splines, and their factors
         needed = splines if task.settings.boundary == "thin-plate" else 0.0
@@ -110,16 +162,18 @@ def _driven(sample: SampleSettings) -> bool:
 def _prospect(task: Task) -> Prospect:
     simulation, sample = task.find("simulate"), task.find("sample")
     n_x = len(PLANTS[simulation.settings.plant].states) if simulation is not None else 3
-    copies, about = n_x, f"eigenfunctions, {task.settings.boundary}"
-    if task.settings.boundary == "thin-plate":
+    fit = task.settings
+    copies, about = n_x, f"eigenfunctions, {fit.boundary if fit.window == 'trajectory' else fit.lift}"
+    if fit.boundary == "thin-plate":
         starts = sample.settings.trajectories if sample is not None else task.settings.centres
         copies = min(starts, task.settings.centres)
     horizon = None
+    spectrum = Spectrum(fit.eigenvalues, fit.degree, fit.pairs or 0, fit.lowest, fit.highest, fit.damping)
     if simulation is not None:
-        steps, tabulated = simulation.settings.steps, _tabulated(task.settings, simulation.settings.dt)
-        eigenfunctions.check_window(steps, tabulated, simulation.settings.dt)
-        horizon = steps - tabulated
-    return Prospect(copies * eigenfunctions.lattice_size(n_x, task.settings.degree), horizon, about)
+        found = reading(fit, simulation.settings.steps, simulation.settings.dt)
+        eigenfunctions.check_window(simulation.settings.steps, found, simulation.settings.dt)
+        horizon = found.horizon
+    return Prospect(copies * spectrum.count(n_x), horizon, about)
 
 
 def _estimate(task: Task) -> Cost:
@@ -128,12 +182,15 @@ def _estimate(task: Task) -> Cost:
     wide = task.settings.centres if task.settings.boundary == "thin-plate" else 1
     table = 3 * J * (1 + round(task.settings.tabulate / simulation.dt))
     seconds = 0.3 + 2e-9 * J * wide * min(J, wide) + 1e-9 * J * simulation.steps * min(J, wide)
-    return Cost(seconds, 8.0 * (2 * table + J * min(J, wide) + 7 * functions))
+    copies = 2 ** len(task.settings.mirror)
+    if task.settings.window == "horizon":
+        seconds, table = seconds + 3.0 * task.settings.trust, copies * 3 * J * (simulation.steps + 1)
+    return Cost(seconds, 8.0 * (2 * copies * table + J * min(J, wide) + 7 * functions))
 
 
 STAGE = Stage(
     name="fit-eigen",
-    version=1,
+    version=2,
     settings=lambda values: build(FitEigen, values),
     run=_run,
     unpack=Predictor.unpack,

@@ -14,15 +14,19 @@ from koopcli.config.samples import (
     BallSample,
     BoxSample,
     EllipsoidSample,
+    GreedySample,
     GridSample,
     PointSample,
     SampleSettings,
 )
 from koopcli.errors import InvalidValueError
 from koopcli.records import FloatArray, Meta, Sample
-from koopcli.simulation import sampling
+from koopcli.simulation import designs, sampling
+from koopcli.simulation.integrate import simulate
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
 from koopcli.vehicles.plants import PLANTS
+from koopcli.vehicles.single_track import SlipInput
+from koopcli.vehicles.symmetry import images
 
 
 def _settings(values: Mapping[str, Any]) -> SampleSettings:
@@ -42,9 +46,33 @@ def _run(settings: SampleSettings, inputs: Inputs, context: Context) -> Sample:
         states = np.array([s.x0])
         u = sampling.excite(np.random.default_rng(s.seed), s.excitation, s.amplitude, 1, s.steps, n_u)
     else:
-        points = sampling.ball(s.seed, s.count) if isinstance(s, BallSample) else sampling.MESHES[s.mesh](s.count)
-        states, u = points * sampling.semi_axes(s.energy, s.m, s.Jzz), np.zeros((s.count, 1, n_u))
+        states = _inside(s, context)
+        u = np.zeros((len(states), 1, n_u))
     return Sample(factors, states, u, bool(factors), plant.states, plant.inputs)
+
+
+def _inside(s: EllipsoidSample | GreedySample | BallSample, context: Context) -> FloatArray:
+    """States (n, n_x) on Γ or inside."""
+    semi_axes = sampling.semi_axes(s.energy, s.m, s.Jzz)
+    if isinstance(s, BallSample):
+        return sampling.ball(s.seed, s.count) * semi_axes
+    if isinstance(s, EllipsoidSample):
+        return sampling.shells(sampling.MESHES[s.mesh](s.count), s.shells) * semi_axes
+    plant = SlipInput(s.vehicle, s.v_eps)
+    u = np.zeros((designs.BATCH, s.steps, len(plant.inputs)))
+
+    def flow(x0: FloatArray) -> FloatArray:
+        return simulate(plant.rhs, x0, u[: len(x0)], s.dt, fastest_rate=plant.fastest_rate)
+
+    return designs.fill(
+        sampling.ball(s.seed, s.candidates) * semi_axes,
+        s.count,
+        flow,
+        round(s.usable / s.dt) + 1,
+        images(s.mirror, s.vehicle),
+        lambda x: np.asarray(x / semi_axes),
+        context.progress,
+    )
 
 
 def _figures(sample: Sample) -> Meta:
@@ -63,11 +91,33 @@ def _check(task: Task) -> None:
         raise InvalidValueError(f"'test.point.x0' must have one value for each of {', '.join(names)}, got {s.x0}")
     if isinstance(s, EllipsoidSample):
         sampling.check_mesh(s.mesh, s.count)
+    if isinstance(s, GreedySample):
+        _check_greedy(s)
     refuse_beyond_memory("the sample", _estimate(task).bytes, "sample.count")
 
 
+def _check_greedy(s: GreedySample) -> None:
+    images(s.mirror, s.vehicle)
+    SlipInput(s.vehicle, s.v_eps)
+    length = s.steps * s.dt
+    if s.count < 1:
+        raise InvalidValueError(f"'sample.budget' of {s.budget:g} s does not pay for one trajectory of {length:g} s")
+    if s.count > s.candidates:
+        raise InvalidValueError(
+            f"'sample.budget' of {s.budget:g} s pays for {s.count:,} trajectories, more than the states to choose "
+            f"from: raise sample.candidates from {s.candidates:,}"
+        )
+    if s.usable > length:
+        raise InvalidValueError(f"'sample.usable' of {s.usable:g} s is longer than trajectories of {length:g} s")
+
+
 def _estimate(task: Task) -> Cost:
-    return Cost(2e-8 * task.settings.numbers, 8.0 * task.settings.numbers)
+    s = task.settings
+    seconds = 0.0
+    if isinstance(s, GreedySample):
+        trees = s.count / designs.BATCH * (s.candidates + s.count * s.usable / s.dt) * 5e-7
+        seconds = trees + s.count * s.candidates * 3e-7 + 1e-5 * s.count * s.steps
+    return Cost(seconds + 2e-8 * s.numbers, 8.0 * s.numbers)
 
 
 STAGE = Stage(

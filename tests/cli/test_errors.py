@@ -74,7 +74,7 @@ def one_line(result, code, *parts):
         ),
         (["fit-eigen", "--tabulate", "0.3"], 3, "leaves nothing of trajectories of 0.3 s"),
         (["fit-eigen", "--tabulate", "0.015"], 3, "whole number of sampling periods of 0.01 s"),
-        (["fit-eigen", "--degree", "9"], 3, "220 rates for trajectories of 30 steps"),
+        (["fit-eigen", "--degree", "9"], 3, "220 rates are too many for windows of 30 steps"),
         (["fit-eigen", "--cut", "2"], 3, "'fit-eigen.cut' must be at most 0.5"),
         (["fit-eigen", "--set", "sample.kind=grid"], 3, "an eigenfunction e^(λt) g(x0) belongs to a system that runs"),
         (["fit-eigen", "--set", "sample.kind=box"], 3, "drives its trajectories with inputs that change"),

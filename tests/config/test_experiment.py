@@ -6,7 +6,7 @@ from typing import get_args, get_type_hints
 
 import pytest
 
-from koopcli.config import samples, settings
+from koopcli.config import plants, samples, settings
 from koopcli.config.data import data_folder
 from koopcli.config.experiment import SECTIONS, load_experiment, parse_set
 from koopcli.config.samples import SAMPLES, BoxSample, GridSample
@@ -15,11 +15,14 @@ from koopcli.errors import InvalidValueError, UnknownNameError, UsageError
 from koopcli.figures.registry import FIGURES
 from koopcli.koopman.baselines import FORECASTS
 from koopcli.koopman.bases import BASES
-from koopcli.koopman.predictor import TABLES
+from koopcli.koopman.frames import FRAMES
+from koopcli.koopman.lookup import LOOKUPS
+from koopcli.koopman.rates import RATES
 from koopcli.koopman.thin_plate import PLACEMENTS
 from koopcli.simulation.sampling import DRAWS, MESHES
 from koopcli.vehicles.plants import PLANTS
 from koopcli.vehicles.single_track import WHEELS_PER_FORCE
+from koopcli.vehicles.symmetry import MIRRORS
 
 PAPER = tomllib.loads((data_folder() / "experiments" / "paper.toml").read_text())
 
@@ -28,7 +31,7 @@ PAPER = tomllib.loads((data_folder() / "experiments" / "paper.toml").read_text()
     ("literal", "registry"),
     [
         (samples.Draw, DRAWS),
-        (samples.PlantName, PLANTS),
+        (plants.PlantName, PLANTS),
         (settings.ForcePer, WHEELS_PER_FORCE),
         (settings.BasisName, BASES),
         (settings.BasisName, settings.OF_BASIS),
@@ -36,11 +39,14 @@ PAPER = tomllib.loads((data_folder() / "experiments" / "paper.toml").read_text()
         (settings.FigureName, FIGURES),
         (samples.Kind, samples.SAMPLES),
         (samples.Kind, samples.SAMPLED_FOR),
-        (samples.PlantName, samples.CUSTOMS),
-        (samples.PlantName, settings.UNUSED),
+        (plants.PlantName, samples.CUSTOMS),
+        (samples.PlantName, plants.UNUSED),
         (samples.Excitation, samples.INPUTS),
         (samples.Mesh, MESHES),
-        (settings.LiftName, TABLES),
+        (settings.LiftName, LOOKUPS),
+        (settings.Eigenvalues, RATES),
+        (settings.Coordinates, FRAMES),
+        (samples.Mirror, MIRRORS),
         (settings.BaselineKind, FORECASTS),
     ],
 )
@@ -57,6 +63,8 @@ def test_the_paper_file_writes_out_every_default():
     body = {"m": vehicle.m, "Jzz": vehicle.Jzz}
     assert loaded.sample("ellipsoid") == SAMPLES["ellipsoid"](**body)
     assert loaded.test("ball", vehicle) == SAMPLES["ball"](**body)
+    simulation = {"vehicle": vehicle, "dt": 0.01, "v_eps": 0.1}
+    assert loaded.sample("greedy") == SAMPLES["greedy"](**simulation).settled()
     assert loaded.fit_edmd == FitEdmd()
     assert loaded.fit_eigen == FitEigen()
     assert loaded.evaluate == Evaluate()
@@ -65,11 +73,12 @@ def test_the_paper_file_writes_out_every_default():
     for section, kind in (
         ("sample", "grid"),
         ("sample", "ellipsoid"),
+        ("sample", "greedy"),
         ("test", "box"),
         ("test", "point"),
         ("test", "ball"),
     ):
-        assert set(PAPER[section][kind]) == {f.name for f in fields(SAMPLES[kind])} - {"kind", "m", "Jzz"}
+        assert set(PAPER[section][kind]) == {f.name for f in fields(SAMPLES[kind])} - {"kind", *samples.ELSEWHERE}
     for section, cls in {"fit-edmd": FitEdmd, "fit-eigen": FitEigen, "evaluate": Evaluate}.items():
         assert set(PAPER[section]) == {f.name for f in fields(cls) if f.default is not None}
     assert set(PAPER["reproduce"]) == {f.name for f in fields(Reproduce)}
@@ -81,7 +90,7 @@ def test_every_setting_has_a_help_text():
     for cls in (*SAMPLES.values(), FitEdmd, FitEigen, Baseline, Evaluate, PlotOptions, Simulate, Reproduce):
         hints = get_type_hints(cls)
         for f in fields(cls):
-            if f.name not in ("kind", "vehicle", "m", "Jzz"):
+            if f.name not in ("kind", *samples.ELSEWHERE) or (cls is Simulate and f.name != "vehicle"):
                 assert f.metadata["help"], (cls.__name__, f.name, hints[f.name])
 
 
@@ -205,7 +214,7 @@ def test_a_bad_experiment_file_is_refused_by_file_and_key(tmp_path, text, says):
 
 
 def test_an_unknown_experiment_lists_the_shipped_ones():
-    with pytest.raises(UnknownNameError, match=r"known: paper, smoke"):
+    with pytest.raises(UnknownNameError, match=r"known: best-eigen, paper, smoke"):
         load_experiment("papre", {})
 
 

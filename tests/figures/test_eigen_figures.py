@@ -21,12 +21,11 @@ from koopcli.figures import (
 from koopcli.figures.drawing import Source
 from koopcli.koopman import edmd
 from koopcli.koopman.bases import Choice
-from koopcli.koopman.eigenfunctions import fit
 from koopcli.koopman.evaluation import evaluate
 from koopcli.records import Sample
 from koopcli.simulation import sampling
 from koopcli.vehicles.single_track import SlipInput
-from tests.conftest import ball_of, surface_of, trajectories_of
+from tests.conftest import ball_of, eigen_fit, surface_of, trajectories_of
 from tests.stages.toys import figure_settings
 
 
@@ -34,8 +33,7 @@ from tests.stages.toys import figure_settings
 def made(vehicle):
     plant = SlipInput(vehicle)
     training, test = trajectories_of(plant, surface_of(plant), 30), trajectories_of(plant, ball_of(plant, 60), 10)
-    settings = {"degree": 2, "boundary": "optimal", "centres": 1, "seed": 0, "scaling": "raw", "cut": 1e-8}
-    predictor = fit(training, **settings, tabulated=20)
+    predictor = eigen_fit(training, boundary="optimal", cut=1e-8, tabulated=20)
     evaluation = evaluate(predictor, test, slice(None), 0)
     return {"training": training, "trajectories": test, "predictor": predictor, "evaluation": evaluation}
 

@@ -14,32 +14,17 @@ from koopcli.errors import InvalidValueError
 from koopcli.koopman import edmd
 from koopcli.koopman.baselines import FORECASTS, Forecast
 from koopcli.koopman.bases import Choice
-from koopcli.koopman.eigenfunctions import (
-    check_growth,
-    dmd_rates,
-    fit,
-    lattice,
-    lattice_size,
-)
 from koopcli.koopman.evaluation import evaluate
 from koopcli.koopman.modes import exponentials
 from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.rates import check_growth, dmd_rates, lattice, lattice_size
 from koopcli.koopman.thin_plate import draw_centres, thin_plate
 from koopcli.records import Channels, Trajectories
 from koopcli.vehicles.parameters import read_vehicle
 from koopcli.vehicles.single_track import SlipInput
-from tests.conftest import ball_of, grid_sample, surface_of, trajectories_of
+from tests.conftest import ball_of, eigen_fit, grid_sample, surface_of, trajectories_of
 
 REFERENCE = json.loads((Path(__file__).parents[1] / "golden" / "eigen_reference.json").read_text())
-FIT = {
-    "degree": 2,
-    "boundary": "thin-plate",
-    "centres": 441,
-    "seed": 0,
-    "scaling": "raw",
-    "cut": None,
-    "tabulated": 100,
-}
 
 
 def linear(F, x0, steps, dt=0.01) -> Trajectories:
@@ -109,7 +94,7 @@ def test_growth_beyond_the_floating_point_range_is_refused():
         check_growth(np.array([-1.0, 200.0]), 1.5)
     growing = linear(np.array([[20.0]]), np.array([[1.0], [-2.0], [0.5]]), 61)
     with pytest.raises(InvalidValueError, match=r"the rate 1200 1/s makes .* within 0\.61 s: lower fit-eigen\.degree"):
-        fit(growing, **{**FIT, "degree": 60, "tabulated": 5, "centres": 3})
+        eigen_fit(growing, **{"degree": 60, "tabulated": 5, "centres": 3})
 
 
 # --- boundary functions
@@ -134,7 +119,7 @@ def test_the_centres_are_drawn_as_written_down(spiral):
 @pytest.mark.parametrize("boundary", ["optimal", "thin-plate"])
 def test_a_linear_system_is_predicted_exactly(spiral, boundary):
     """Its states are eigenfunctions of degree one, and 25 splines can take any values on 25 initial states."""
-    predictor = fit(spiral, **{**FIT, "degree": 1, "boundary": boundary, "tabulated": 30, "centres": 60})
+    predictor = eigen_fit(spiral, **{"degree": 1, "boundary": boundary, "tabulated": 30, "centres": 60})
     assert predictor.horizon == 30
     for k in (0, 7, 30):
         found = predictor.predict(spiral.x[:, k], steps=30)
@@ -147,7 +132,7 @@ def test_the_fit_is_the_least_squares_solution_written_out(spiral, boundary):
     rng = np.random.default_rng(1)
     x = np.array(spiral.x) + 0.1 * rng.standard_normal(spiral.x.shape)
     data = replace(spiral, x=x)
-    predictor = fit(data, **{**FIT, "degree": 1, "boundary": boundary, "tabulated": 40, "centres": 6, "cut": 1e-13})
+    predictor = eigen_fit(data, **{"degree": 1, "boundary": boundary, "tabulated": 40, "centres": 6, "cut": 1e-13})
     V = exponentials(predictor.A.rates, 0.01 * np.arange(61.0))
     if boundary == "optimal":
         expected = np.einsum("kl,jls->jks", V, np.linalg.pinv(V) @ x)
@@ -163,14 +148,14 @@ def test_the_fit_is_the_least_squares_solution_written_out(spiral, boundary):
 
 def test_complex_rates_at_a_tabulated_sample(spiral):
     """z is carried on by A, and A by e^{λt}: C A^k from sample k0 is the fit at k0 + k."""
-    predictor = fit(spiral, **{**FIT, "degree": 2, "boundary": "optimal", "tabulated": 30, "cut": 1e-9})
+    predictor = eigen_fit(spiral, **{"degree": 2, "boundary": "optimal", "tabulated": 30, "cut": 1e-9})
     assert (predictor.A.rates.imag != 0).any()
     start = predictor.predict(spiral.x[:, 0], steps=30)
     assert predictor.predict(spiral.x[:, 12], steps=18) == pytest.approx(start[:, 12:], abs=1e-9)
 
 
 def test_it_survives_storage(spiral):
-    predictor = fit(spiral, **{**FIT, "degree": 1, "tabulated": 30, "centres": 9, "cut": 1e-12})
+    predictor = eigen_fit(spiral, **{"degree": 1, "tabulated": 30, "centres": 9, "cut": 1e-12})
     again = Predictor.unpack(predictor.pack())
     assert again.horizon == 30
     assert (again.predict(spiral.x[:, 3], steps=5) == predictor.predict(spiral.x[:, 3], steps=5)).all()
@@ -181,29 +166,29 @@ def test_it_survives_storage(spiral):
 
 
 def test_past_the_window_is_refused_with_the_longest_allowed(spiral):
-    predictor = fit(spiral, **{**FIT, "degree": 1, "tabulated": 30, "centres": 9, "cut": 1e-12})
+    predictor = eigen_fit(spiral, **{"degree": 1, "tabulated": 30, "centres": 9, "cut": 1e-12})
     with pytest.raises(InvalidValueError, match=r"31 steps are past the window .* may be asked for 30 at most"):
         predictor.predict(spiral.x[:, 0], steps=31)
 
 
 def test_what_the_data_must_be(spiral, plant):
     with pytest.raises(InvalidValueError, match=r"inputs of these trajectories change or differ \(trajectory 1\)"):
-        fit(trajectories_of(plant, grid_sample(count=3, columns=2), 5), **{**FIT, "tabulated": 2})
+        eigen_fit(trajectories_of(plant, grid_sample(count=3, columns=2), 5), **{"tabulated": 2})
     moving = np.zeros(spiral.u.shape)
     moving[4, 10:] = 0.1
     with pytest.raises(InvalidValueError, match=r"\(trajectory 4\)"):
-        fit(replace(spiral, u=moving), **{**FIT, "tabulated": 30})
-    fit(replace(spiral, u=np.full(spiral.u.shape, 0.1)), **{**FIT, "tabulated": 30, "centres": 5})  # one for all
+        eigen_fit(replace(spiral, u=moving), **{"tabulated": 30})
+    eigen_fit(replace(spiral, u=np.full(spiral.u.shape, 0.1)), **{"tabulated": 30, "centres": 5})  # one for all
     x = np.array(spiral.x)
     x[2, 3] = np.nan
     with pytest.raises(InvalidValueError, match="trajectory 2 holds values that are not finite"):
-        fit(replace(spiral, x=x), **{**FIT, "tabulated": 30})
+        eigen_fit(replace(spiral, x=x), **{"tabulated": 30})
     with pytest.raises(
         InvalidValueError, match=r"'fit-eigen.tabulate' of 0\.6 s leaves nothing of trajectories of 0\.6"
     ):
-        fit(spiral, **{**FIT, "tabulated": 60})
-    with pytest.raises(InvalidValueError, match=r"'fit-eigen\.degree' gives 84 rates for trajectories of 60 steps"):
-        fit(spiral, **{**FIT, "tabulated": 30, "degree": 6})
+        eigen_fit(spiral, **{"tabulated": 60})
+    with pytest.raises(InvalidValueError, match=r"84 rates are too many for windows of 60 steps"):
+        eigen_fit(spiral, **{"tabulated": 30, "degree": 6})
 
 
 # --- at the paper's size
@@ -235,10 +220,10 @@ def full():
 def test_the_reference_table_at_full_size(full, row):
     training = full(row["vehicle"], row.get("peak"), row.get("steps", 150))
     test = full(row["vehicle"], row.get("peak"), seed=row.get("seed", 0))
-    settings = {**FIT, **row["fit"]}
-    if settings["cut"] is None and settings["boundary"] == "thin-plate":
+    settings = dict(row["fit"])
+    if settings.get("cut") is None and settings.get("boundary", "thin-plate") == "thin-plate":
         settings["cut"] = 1e-14
-    figures = evaluate(fit(training, **settings), test, slice(None), 0).figures()
+    figures = evaluate(eigen_fit(training, **settings), test, slice(None), 0).figures()
     mean, std, median = row["rmse"]
     tolerance = row.get("a", 0) + row.get("r", 0) * mean + 0.05  # half the last digit of most
     assert figures["rmse"]["mean"] == pytest.approx(mean, abs=max(tolerance, 0.5 if mean == int(mean) else 0))
@@ -250,7 +235,7 @@ def test_the_reference_table_at_full_size(full, row):
 
 def test_the_figure_the_paper_prints(full):
     """23 ± 15 %: thin-plate splines, raw, as the text says; and the share of the worst states where data are few."""
-    predictor = fit(full("ctu-2020"), **{**FIT, "cut": 1e-14})
+    predictor = eigen_fit(full("ctu-2020"), **{"cut": 1e-14})
     assert predictor.functions == 4410
     assert predictor.A.rates.real[1:4] == pytest.approx(REFERENCE["rates"]["ctu-2020"], abs=5e-4)
     figures = evaluate(predictor, full("ctu-2020", seed=0), slice(None), 0).figures()
@@ -261,7 +246,7 @@ def test_the_figure_the_paper_prints(full):
 
 @pytest.mark.parametrize("vehicle", ["ctu-2020", "rimac-2018"])
 def test_where_the_errors_are(full, vehicle):
-    predictor = fit(full(vehicle), **{**FIT, "boundary": "optimal", "cut": 1e-10})
+    predictor = eigen_fit(full(vehicle), **{"boundary": "optimal", "cut": 1e-10})
     found = dmd_rates(full(vehicle).x, 0.01)
     assert np.sort(found.real) == pytest.approx(np.sort(REFERENCE["rates"][vehicle]), abs=1e-3)
     figures = evaluate(predictor, full(vehicle, seed=0), slice(None), 0).figures()
@@ -278,7 +263,7 @@ def test_the_cut_decides_the_figure(full, rank):
     singular = np.linalg.svd(V / np.linalg.norm(V, axis=0), compute_uv=False)
     kept = int(rank)
     cut = 0.9 * singular[kept - 1] / singular[0]
-    predictor = fit(training, **{**FIT, "boundary": "optimal", "cut": cut})
+    predictor = eigen_fit(training, **{"boundary": "optimal", "cut": cut})
     assert predictor.rank == kept
     figures = evaluate(predictor, full("ctu-2020", seed=0), slice(None), 0).figures()
     assert figures["rmse"]["mean"] == pytest.approx(REFERENCE["ranks"][rank], rel=0.01)
@@ -312,11 +297,15 @@ def test_started_at_a_tabulated_sample_it_is_the_directly_evaluated_fit(full, se
     In plain exponentials the terms of that sum are 1e10 times larger than it, and doubles are left with six digits.
     """
     training = full("ctu-2020")
-    predictor = fit(training, **{**FIT, **settings})
+    predictor = eigen_fit(training, **{**settings})
     modes, copies = predictor.A, predictor.A.copies
     L, k0, rows = len(modes.rates), 60, np.arange(0, 441, 63)
     found = predictor.predict(np.asarray(training.x[rows, k0]), steps=50)
-    looked_up, at = predictor.observables.nearest(np.asarray(training.x[rows, k0]))
+    (found_nodes, _), nodes = (
+        predictor.observables.nodes.find(np.asarray(training.x[rows, k0])),
+        predictor.observables.nodes,
+    )
+    looked_up, at = nodes.trajectory[found_nodes[:, 0]], nodes.sample[found_nodes[:, 0]]
     assert (at == k0).all()
     with mp.workdps(40):
         rates = [mp.mpf(float(rate)) for rate in modes.rates.real]

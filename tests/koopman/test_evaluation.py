@@ -8,10 +8,9 @@ import pytest
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import edmd
 from koopcli.koopman.bases import Choice
-from koopcli.koopman.eigenfunctions import fit
 from koopcli.koopman.evaluation import Evaluation, evaluate, join
 from koopcli.vehicles.single_track import SlipInput
-from tests.conftest import ball_of, box_sample, grid_sample, surface_of, trajectories_of
+from tests.conftest import ball_of, box_sample, eigen_fit, grid_sample, surface_of, trajectories_of
 
 
 @pytest.fixture(scope="module")
@@ -124,8 +123,8 @@ def test_the_table_has_a_row_for_each_trajectory(pair):
 def looked_up(vehicle):
     """A predictor whose value at k = 0 is an approximation."""
     plant = SlipInput(vehicle)
-    settings = {"degree": 2, "boundary": "optimal", "centres": 1, "seed": 0, "scaling": "raw", "cut": 1e-8}
-    predictor = fit(trajectories_of(plant, surface_of(plant, 49), 30), **settings, tabulated=20)
+    data = trajectories_of(plant, surface_of(plant, 49), 30)
+    predictor = eigen_fit(data, boundary="optimal", cut=1e-8, tabulated=20)
     return predictor, trajectories_of(plant, ball_of(plant, 60), 10)
 
 

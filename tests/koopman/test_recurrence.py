@@ -71,7 +71,7 @@ def test_the_first_step_counts_too_but_for_its_own_start():
     x[1, :, 0], x[1, :, 2] = 0.5, [0, 5, 10, 15]
     with pytest.raises(InvalidValueError, match=r"trajectory 0 comes back at 0 s to the initial state of trajectory 1"):
         check_recurrence(x, 0.1)
-    assert not check_recurrence(x[:1], 0.1)
+    assert check_recurrence(x[:1], 0.1) is None
 
 
 def test_a_bent_path_is_followed_between_its_samples():
@@ -112,11 +112,23 @@ def test_energy_that_comes_back_later_is_found(sliding):
         check_recurrence(x, 0.01, surface(sliding))
 
 
-def test_states_of_several_energies_are_only_checked_pointwise(sliding):
-    """Shells and volumes are no surface of one energy; their trajectories may cross one another's level."""
-    x0 = np.concatenate([f * surface_of(sliding, n, "fibonacci").states for f, n in ((1, 25), (0.5, 16))])
-    x = trajectories_of(sliding, replace(surface_of(sliding), states=x0, inputs=np.zeros((41, 1, 4))), 60).x
-    assert not check_recurrence(x, 0.01, surface(sliding))
+def shells(plant, factors, counts):
+    x0 = np.concatenate([f * surface_of(plant, n, "fibonacci").states for f, n in zip(factors, counts, strict=True)])
+    return trajectories_of(plant, replace(surface_of(plant), states=x0, inputs=np.zeros((len(x0), 1, 4))), 60).x
+
+
+def test_every_shell_is_a_surface_of_its_own(sliding):
+    """Trajectories of one may cross another, but none comes back to its own."""
+    x = np.array(shells(sliding, (1, 0.5), (25, 16)))
+    assert check_recurrence(x, 0.01, surface(sliding)) == 2
+    x[30, 20] = x[30, 0] * 1.01
+    with pytest.raises(InvalidValueError, match="trajectory 30 comes back to"):
+        check_recurrence(x, 0.01, surface(sliding))
+
+
+def test_states_in_a_volume_are_only_checked_pointwise(sliding):
+    x = shells(sliding, np.linspace(0.3, 1, 12), [3] * 12)
+    assert check_recurrence(x, 0.01, surface(sliding)) is None
 
 
 def test_equal_initial_states(sliding):

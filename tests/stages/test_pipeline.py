@@ -202,7 +202,7 @@ def test_an_interrupted_evaluation_goes_on_where_it_stopped(fresh, monkeypatch):
     whole = fresh()[0].make(recipes.evaluation(experiment("evaluate.first=2", "evaluate.chunk=9")))
     real, calls = evaluation.evaluate, []
 
-    def interrupt(predictor, trajectories, rows, first, restart):
+    def interrupt(predictor, trajectories, rows, first, *more):
         if len(calls) == 3:
             raise KeyboardInterrupt
         calls.append(rows)

@@ -13,17 +13,18 @@ from pathlib import Path
 import numpy as np
 
 from koopcli.checks import build
-from koopcli.config.samples import BallSample, BoxSample, EllipsoidSample, GridSample, PointSample
+from koopcli.config.samples import BallSample, BoxSample, EllipsoidSample, GreedySample, GridSample, PointSample
 from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Plot, Series, Simulate, Tyres
 from koopcli.figures.registry import FIGURES
 from koopcli.koopman.baselines import Forecast
 from koopcli.koopman.coverage import Coverage
 from koopcli.koopman.evaluation import Evaluation
 from koopcli.koopman.modes import Modes
+from koopcli.koopman.nodes import Search, nodes_of
 from koopcli.koopman.orthonormal import OrthonormalPolynomials
 from koopcli.koopman.polynomial import Polynomial
 from koopcli.koopman.predictor import Predictor
-from koopcli.koopman.tabulated import Nearest
+from koopcli.koopman.tabulated import Tabulated
 from koopcli.progress import silent
 from koopcli.records import Sample, Trajectories
 from koopcli.stages.base import Context
@@ -99,7 +100,7 @@ def _looked_up() -> Predictor:
     starts = 1 + np.sin(np.arange(18.0)).reshape(3, 2, 3)
     C = 10 * np.cos(np.arange(18.0)).reshape(3, 6)
     states = 3 * np.sin(np.arange(45.0) ** 2).reshape(3, 5, 3)
-    lift = Nearest(states, starts, modes)
+    lift = Tabulated(states, nodes_of(states, states.shape[1], Search("nearest", np.ones(3))), starts, modes)
     return Predictor(lift, modes, np.zeros((6, 4)), C, 0.01, _coverage(), STATES, INPUTS, 5, 6, 1e3, 1.0, horizon=8)
 
 
@@ -135,6 +136,7 @@ def _evaluation() -> Evaluation:
         in_domain=t / 10,
         distance=np.sin(t),
         outside=t > 5,
+        bound=t * 1.2 + 0.1 * np.sin(t),
         diverged=t > 8,
         diverged_relift=t > 7,
         start=np.zeros(10, dtype=int),
@@ -215,6 +217,20 @@ TOYS = {
         (PointSample(steps=4), {}),
         (PointSample(x0=(3.0, 2.0, 1.0), excitation="held", seed=5), {}),
         (GridSample(seed=3, count=4, columns=2, draw="chebyshev"), {}),
+        (EllipsoidSample(count=12, mesh="fibonacci", shells=3, m=1200.0, Jzz=1500.0), {}),
+        (
+            GreedySample(
+                budget=4.0,
+                steps=10,
+                usable=0.05,
+                candidates=200,
+                mirror=("left-right",),
+                vehicle=CAR,
+                dt=0.01,
+                v_eps=0.1,
+            ),
+            {},
+        ),
     ],
     "simulate": [
         (Simulate(vehicle=CAR, plant="forces", steps=3), {"sample": _sample()}),
@@ -236,6 +252,40 @@ TOYS = {
         (FitEigen(centres=4, tabulate=0.05, cut=1e-6), {"trajectories": _gliding()}),
         (FitEigen(centres=6, tabulate=0.05, cut=1e-6, scaling="extent", seed=3), {"trajectories": _gliding()}),
         (FitEigen(boundary="optimal", degree=1, tabulate=0.04), {"trajectories": _gliding()}),
+        (
+            FitEigen(boundary="optimal", eigenvalues="comb", pairs=1, cut=1e-8, tabulate=0.05, lift="linear", nodes=4),
+            {"trajectories": _gliding()},
+        ),
+        (
+            FitEigen(
+                eigenvalues="comb",
+                pairs=1,
+                cut=1e-8,
+                window="horizon",
+                horizon=0.05,
+                tabulate=0.08,
+                lift="mls",
+                coordinates="world",
+                rounds=1,
+                neighbours=8,
+                radial_power=0.7,
+                trust=True,
+            ),
+            {"trajectories": _gliding()},
+        ),
+        (
+            FitEigen(
+                eigenvalues="varpro",
+                pairs=1,
+                cut=1e-6,
+                window="horizon",
+                tabulate=0.05,
+                lift="polyharmonic",
+                neighbours=12,
+                spacing=2,
+            ),
+            {"trajectories": _gliding()},
+        ),
     ],
     "baseline": [
         (Baseline(), {"trajectories": _gliding()}),

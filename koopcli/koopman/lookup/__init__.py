@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from koopcli.errors import InvalidValueError
+from koopcli.koopman.lookup.cloud import Cloud
 from koopcli.koopman.lookup.linear import Linear
 from koopcli.koopman.lookup.mls import MovingLeastSquares
 from koopcli.koopman.lookup.nearest import Nearest
@@ -31,20 +32,19 @@ class Lookup(Protocol):
 
 @dataclass(frozen=True)
 class Kind:
-    """A way to look up: ``make`` it of nodes (N, n_x) and a number of neighbours; ``fewest(n_x)`` nodes it needs;
-    ``neighbours`` it takes unless told otherwise, None where it has no such number; ``beyond``: what happens outside
-    the convex hull of the nodes.
+    """A way to look up: ``make`` it of nodes; ``fewest(n_x)`` nodes it needs; ``neighbours`` it takes unless told
+    otherwise, None where it has no such number; ``beyond``: what happens outside the convex hull of the nodes.
     """
 
-    make: Callable[[FloatArray, int], Lookup]
+    make: Callable[[Cloud], Lookup]
     fewest: Callable[[int], int]
     neighbours: int | None
     beyond: str
 
 
 LOOKUPS: dict[str, Kind] = {
-    "nearest": Kind(lambda nodes, _: Nearest(nodes), lambda n_x: 1, None, "take the nearest sample, as everywhere"),
-    "linear": Kind(lambda nodes, _: Linear(nodes), lambda n_x: n_x + 1, None, "take the nearest sample"),
+    "nearest": Kind(Nearest, lambda n_x: 1, None, "take the nearest sample, as everywhere"),
+    "linear": Kind(Linear, lambda n_x: n_x + 1, None, "take the nearest sample"),
     "mls": Kind(MovingLeastSquares, lambda n_x: n_x + 1, 24, "continue the local linear function"),
     "polyharmonic": Kind(
         Polyharmonic, lambda n_x: (n_x + 1) * (n_x + 2) // 2, 60, "continue the local spline, which bends there"
@@ -59,7 +59,7 @@ def check_nodes(kind: str, places: FloatArray, neighbours: int | None) -> int:
     """
     about = LOOKUPS[kind]
     count, n_x = places.shape
-    wanted = neighbours or about.neighbours or 0
+    wanted = neighbours or about.neighbours or 1
     fewest = about.fewest(n_x)
     if about.neighbours is not None and wanted < fewest:
         raise InvalidValueError(
@@ -76,11 +76,6 @@ def check_nodes(kind: str, places: FloatArray, neighbours: int | None) -> int:
             f"the {count} nodes lie in a plane, where the lift '{kind}' knows no way out: {more}, or choose 'nearest'"
         )
     return wanted
-
-
-def lookup(kind: str, places: FloatArray, neighbours: int | None) -> Lookup:
-    """The lookup of ``kind`` over nodes at ``places`` (N, n_x). Raises what :func:`check_nodes` raises."""
-    return LOOKUPS[kind].make(places, check_nodes(kind, places, neighbours))
 
 
 def search(lookup: Lookup, y: FloatArray) -> tuple[IndexArray, FloatArray]:

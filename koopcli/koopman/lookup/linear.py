@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from koopcli.errors import InvalidValueError
+from koopcli.koopman.lookup.cloud import Cloud
 from koopcli.koopman.modes import IndexArray
 from koopcli.records import BoolArray, FloatArray
 
@@ -15,16 +16,17 @@ SAME = 1e-9  # nodes nearer to one another are one
 
 
 class Linear:
-    """Barycentric weights of the simplex around a place; outside the hull the nearest node. ``nodes`` (N, n_x).
+    """Barycentric weights of the simplex around a place; outside the hull the nearest node.
 
     The simplex is found by a visibility walk, all places at once: from a simplex at the nearest node, each step
     crosses the facet that the place lies farthest beyond. ``Delaunay.find_simplex`` answers the same, but first
     prepares every simplex of the triangulation. Raises ``InvalidValueError`` for nodes in a plane.
     """
 
-    def __init__(self, nodes: FloatArray) -> None:
-        from scipy.spatial import Delaunay, QhullError, cKDTree  # noqa: PLC0415  (as in nearest.py)
+    def __init__(self, cloud: Cloud) -> None:
+        from scipy.spatial import Delaunay, QhullError, cKDTree  # noqa: PLC0415  (as in cloud.py)
 
+        nodes = cloud.places
         _, kept = np.unique(np.round(nodes / SAME), axis=0, return_index=True)
         kept.sort()
         try:

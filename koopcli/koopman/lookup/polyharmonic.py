@@ -6,64 +6,88 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
+from koopcli.koopman.lookup.cloud import Cloud
+from koopcli.koopman.lookup.mls import trend_weights
 from koopcli.koopman.modes import IndexArray
 from koopcli.records import FloatArray
 
 TOGETHER = 256  # places solved for at once
-SOFT = 1e-9  # on the diagonal: nodes that nearly coincide share their weight
+STIFF = 1e-9  # softness of a spline that meets its nodes
+LARGEST = 10.0  # sum of absolute weights, beyond which a simpler spline is taken
+SIMPLER = ((1, STIFF), (1, 1e-4), (1, 1e-2))  # degree and softness, one after the other
 
 
 class Polyharmonic:
-    """The spline of r³ with a quadratic tail through the ``neighbours`` nearest nodes, read at the place.
+    """The spline of r³ with a quadratic tail through the neighbours of a place, read there.
 
-    ``nodes`` (N, n_x). Meets the nodes' values, and those of any quadratic function everywhere. Distances are divided
-    by that of the farthest neighbour, which keeps every small system alike.
+    Meets the nodes' values, and those of any quadratic function everywhere. Distances are divided by that of the
+    farthest neighbour, which keeps every small system alike. Where neighbours lie nearly in a plane or on a line, the
+    weights grow far beyond one and with them every error of the nodes: such a place has a linear tail instead, then a
+    softer spline, and in the end no more than the trend of its neighbours.
     """
 
-    def __init__(self, nodes: FloatArray, neighbours: int) -> None:
-        from scipy.spatial import cKDTree  # noqa: PLC0415  (as in nearest.py)
-
-        self._nodes, self._neighbours = nodes, neighbours
-        self._tree = cKDTree(nodes)
+    def __init__(self, nodes: Cloud) -> None:
+        self._nodes = nodes
 
     def __call__(self, y: FloatArray) -> tuple[IndexArray, FloatArray]:
         """The neighbours (n, q) of each of ``y`` (n, n_x) and what each of their values counts."""
-        distance, found = self._tree.query(y, self._neighbours)
+        found = self._nodes.near(y)
         weights = np.empty(found.shape)
         for start in range(0, len(y), TOGETHER):
             rows = slice(start, start + TOGETHER)
-            near = self._nodes[found[rows]] - y[rows, np.newaxis]
-            weights[rows] = spline_weights(near / np.maximum(distance[rows, -1], np.finfo(float).tiny)[:, None, None])
-        return np.asarray(found, dtype=np.intp), weights
+            way = self._nodes.places[found[rows]] - y[rows, np.newaxis]
+            size = np.sqrt((way**2).sum(axis=2).max(axis=1))
+            weights[rows] = _bounded(way / np.maximum(size, np.finfo(float).tiny)[:, np.newaxis, np.newaxis])
+        return found, weights
 
 
-def spline_weights(near: FloatArray) -> FloatArray:
-    """The weights (n, q) of values at nodes ``near`` (n, q, n_x), for the value at zero.
+def _bounded(near: FloatArray) -> FloatArray:
+    """The weights (n, q), simpler where they would be large."""
+    weights = spline_weights(near, 2, STIFF)
+    wild = np.flatnonzero(_wild(weights))
+    for degree, softness in SIMPLER:
+        if not len(wild):
+            break
+        weights[wild] = spline_weights(near[wild], degree, softness)
+        wild = wild[_wild(weights[wild])]
+    weights[wild] = trend_weights(near[wild])
+    return weights
 
-    Solves [Φ P; Pᵀ 0] [w; ·] = [φ; p] with Φ = |y_i - y_j|³, P the monomials to degree two, φ and p those of zero.
+
+def _wild(weights: FloatArray) -> FloatArray:
+    return ~np.asarray(np.abs(weights).sum(axis=1) <= LARGEST)
+
+
+def spline_weights(near: FloatArray, degree: int, softness: float) -> FloatArray:
+    """The weights (n, q) of values at nodes ``near`` (n, q, n_x), for the value at zero, eq. (7.11).
+
+    Solves [Φ + softness P; Pᵀ 0] [w; ·] = [φ; p] with Φ = |y_i - y_j|³, P the monomials to ``degree`` one or two, φ and
+    p those of zero.
     """
-    n, q, n_x = near.shape
+    n, q = near.shape[:2]
     square = (near**2).sum(axis=2)
     between = square[:, :, np.newaxis] + square[:, np.newaxis] - 2 * np.matmul(near, near.transpose(0, 2, 1))
     np.maximum(between, 0.0, out=between)
     between *= np.sqrt(between)
-    tail = _quadratic(near)
+    tail = _monomials(near, degree)
     m = tail.shape[2]
     system = np.zeros((n, q + m, q + m))
     system[:, :q, :q] = between
     system[:, :q, q:] = tail
     system[:, q:, :q] = tail.transpose(0, 2, 1)
     diagonal = np.arange(q + m)
-    system[:, diagonal[:q], diagonal[:q]] = SOFT
-    system[:, diagonal[q:], diagonal[q:]] = -SOFT * 1e-3
+    system[:, diagonal[:q], diagonal[:q]] = softness
+    system[:, diagonal[q:], diagonal[q:]] = -1e-3 * STIFF  # a tail that the nodes leave open is not used
     right = np.zeros((n, q + m, 1))
     right[:, :q, 0] = square * np.sqrt(square)
     right[:, q, 0] = 1.0
     return np.asarray(np.linalg.solve(system, right)[:, :q, 0])
 
 
-def _quadratic(near: FloatArray) -> FloatArray:
-    """Monomials to degree two of ``near`` (n, q, n_x), the constant first."""
-    n_x = near.shape[2]
-    second = [near[:, :, i] * near[:, :, j] for i, j in combinations_with_replacement(range(n_x), 2)]
-    return np.stack([np.ones(near.shape[:2]), *near.transpose(2, 0, 1), *second], axis=2)
+def _monomials(near: FloatArray, degree: int) -> FloatArray:
+    """Monomials of ``near`` (n, q, n_x) to ``degree`` one or two, the constant first."""
+    first = [np.ones(near.shape[:2]), *near.transpose(2, 0, 1)]
+    if degree == 1:
+        return np.stack(first, axis=2)
+    pairs = combinations_with_replacement(range(near.shape[2]), 2)
+    return np.stack([*first, *(near[:, :, i] * near[:, :, j] for i, j in pairs)], axis=2)
