@@ -19,7 +19,7 @@ from koopcli.cli.options import (
     complete_name,
     names,
 )
-from koopcli.config.experiment import Changes, Values
+from koopcli.config.changes import Changes, Values
 from koopcli.config.samples import BallSample, BoxSample, Excitation
 from koopcli.console import Console, show_table
 

@@ -17,7 +17,7 @@ from koopcli.cli.options import (
     complete_name,
     names,
 )
-from koopcli.config.experiment import Changes, Values
+from koopcli.config.changes import Changes, Values
 from koopcli.config.samples import Mirror
 from koopcli.config.settings import (
     BaselineKind,

@@ -10,7 +10,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from koopcli.config.experiment import Changes, Experiment, flat, load_experiment, parse_set
+from koopcli.config.changes import Changes, flat, parse_set
+from koopcli.config.experiment import Experiment, load_experiment
 from koopcli.console import Console, show_table
 from koopcli.errors import UnknownNameError, UsageError
 

@@ -18,7 +18,7 @@ from koopcli.cli.options import (
     complete_name,
     names,
 )
-from koopcli.config.experiment import Values
+from koopcli.config.changes import Values
 from koopcli.config.plants import PlantName
 from koopcli.config.samples import (
     BallSample,

@@ -12,7 +12,7 @@ import typer
 from koopcli.checks import candidates
 from koopcli.cli.invocation import begin, print_json, write_csv
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption, complete_name
-from koopcli.config.experiment import SECTIONS, flat
+from koopcli.config.changes import SECTIONS, flat
 from koopcli.config.settings import FigureName, ImageFormat
 from koopcli.console import show_table
 from koopcli.errors import InvalidValueError, StorageError, UnknownNameError, UsageError

@@ -14,7 +14,8 @@ import typer
 
 from koopcli.cli.invocation import Invocation, begin, print_json, show_plan
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption
-from koopcli.config.experiment import SECTIONS, flat, load_experiment, nested
+from koopcli.config.changes import SECTIONS, flat, nested
+from koopcli.config.experiment import load_experiment
 from koopcli.console import show_table
 from koopcli.errors import UsageError
 
@@ -49,6 +50,14 @@ def reproduce(
             "--full", help="edmd: also the best order over 30 random training grids (minutes more, and 1.4 GB)."
         ),
     ] = False,
+    beyond: Annotated[
+        bool,
+        typer.Option(
+            "--beyond",
+            help="eigen: also what goes beyond the paper, from its error to the best, with what each step costs and "
+            "buys (minutes more).",
+        ),
+    ] = False,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
@@ -71,9 +80,12 @@ def reproduce(
     call = begin(store, base, set_, SECTIONS, {"reproduce": {"full": True if full else None}})
     from koopcli.reproduction import report
     from koopcli.reproduction.illustrations import illustrate
-    from koopcli.reproduction.registry import METHODS
+    from koopcli.reproduction.registry import BEYOND, METHODS
 
     chosen = list(METHODS.values()) if method == "all" else [METHODS[method]]
+    if beyond and method == "edmd":
+        raise UsageError("--beyond belongs to eigenfunctions: koop reproduce eigen --beyond")
+    chosen += [BEYOND] if beyond else []
     _refuse(call, chosen)
     runs = {one.name: _runs(call, base, one) for one in chosen}
     wanted = {one.name: [task for run in runs[one.name] for task in report.tasks(one, run)] for one in chosen}
@@ -106,7 +118,7 @@ def _refuse(call: Invocation, chosen: Sequence[Method]) -> None:
         if not any(method.uses(name) for method in chosen):
             raise UsageError(f"--set {name} changes nothing in reproduce {' or '.join(one.name for one in chosen)}")
         section, _, key = name.partition(".")
-        if len(chosen) > 1 and section in ("sample", "test") and "." not in key:
+        if len({one.name for one in chosen} - {"beyond"}) > 1 and section in ("sample", "test") and "." not in key:
             kinds = "grid.{0} or sample.ellipsoid.{0}" if section == "sample" else "box.{0} or test.ball.{0}"
             raise UsageError(f"--set {name}: say which, {section}.{kinds.format(key)}")
 
@@ -132,7 +144,7 @@ def _finish(call: Invocation, name: str, parts: Sequence[_Part], *, as_json: boo
 
     for part in parts:
         for table in part.method.tables(part.runs):
-            left = len(table.header) if table.words else 1
+            left = len(table.header) if table.words else table.left
             show_table(table.header, table.rows, title=table.title, left=left, file=sys.stderr)
         for note in part.method.notes(part.runs):
             call.console.note(note)
@@ -183,7 +195,8 @@ def _write_report(call: Invocation, name: str, parts: Sequence[_Part]) -> Path:
     library = bundle()
     if library is None:
         call.console.note("the error map of the report is a picture; pip install 'koopcli[report]' for one to turn")
-    command = shlex.join(["koop", "reproduce", name, *_told(parts)])
+    beyond = ["--beyond"] if any(part.method.name == "beyond" for part in parts) else []
+    command = shlex.join(["koop", "reproduce", name, *beyond, *_told(parts)])
     content = page(sections, command, f"koop {__version__}", library).encode()
     with storage_errors(root):
         if not path.is_file() or path.read_bytes() != content:
@@ -200,7 +213,7 @@ def _told(parts: Sequence[_Part]) -> list[str]:
 
 
 def _run_json(method: Method, run: Run) -> dict[str, Any]:
-    cells = [{**vars(s.cell), "name": s.record.name, **s.figures} for s in run.scored]
+    cells = [{**vars(s.cell), "name": s.record.name, **s.measured, **s.figures} for s in run.scored]
     return {"method": method.name, "run": run.label, "evaluations": cells}
 
 

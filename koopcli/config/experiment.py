@@ -3,36 +3,23 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from koopcli.checks import COMMAND_LINE, Origin, build, candidates, from_file
+from koopcli.config.changes import SECTIONS, Changes, Values
 from koopcli.config.data import locate
 from koopcli.config.samples import ELSEWHERE, OF_SIMULATION, OF_VEHICLE, SAMPLES, SampleSettings
 from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, PlotOptions, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, KoopError, UsageError
 from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
 
-SECTIONS = (
-    "vehicle",
-    "sample",
-    "simulate",
-    "fit-edmd",
-    "fit-eigen",
-    "baseline",
-    "test",
-    "evaluate",
-    "plot",
-    "reproduce",
-)
 KINDS = {"sample": tuple(SAMPLES), "test": ("box", "point", "ball")}
 DEFAULT_VEHICLE = "ctu-2020"
 
 T = TypeVar("T")
-Values = dict[str, Any]
-Changes = dict[str, Values]  # section -> setting -> raw value, or a table of them
 
 
 @dataclass(frozen=True)
@@ -161,55 +148,9 @@ def load_experiment(name: str, changes: Changes) -> Experiment:
     )
 
 
-def parse_set(assignments: Sequence[str]) -> Changes:
-    """``--set stage.key=value`` as changes; the value is TOML, or plain text where it is none."""
-    given = []
-    for text in assignments:
-        name, equals, raw = text.partition("=")
-        section, *keys = name.strip().split(".")
-        if not (equals and keys and all(keys)):
-            raise UsageError(f"--set {text}: write --set stage.key=value, such as --set vehicle.Jzz=1731")
-        if section not in SECTIONS:
-            raise UsageError(f"--set {text}: unknown stage '{section}'{candidates(section, SECTIONS)}")
-        given.append((name.strip(), _toml_value(raw)))
-    return nested(given)
-
-
-def nested(named: Iterable[tuple[str, Any]]) -> Changes:
-    """Changes from full names such as ``vehicle.lateral.mu``: the inverse of :func:`flat`."""
-    changes: Changes = {}
-    for name, value in named:
-        section, *keys = name.split(".")
-        table = changes.setdefault(section, {})
-        for key in keys[:-1]:
-            table = table.setdefault(key, {})
-            if not isinstance(table, dict):
-                raise UsageError(f"--set {name}: '{key}' is given a value of its own as well")
-        table[keys[-1]] = value
-    return changes
-
-
-def flat(changes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Every changed setting by its full name, such as ``vehicle.lateral.mu``, with its raw value."""
-    for key, value in changes.items():
-        if isinstance(value, Mapping):
-            yield from flat(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
-
-
 def vehicle_named(name: str, folder: Path = Path()) -> VehicleParameters:
     """The vehicle ``name`` (shipped, or a file by its path from ``folder``)."""
     return read_vehicle(locate("vehicles", name, "vehicle", folder))
-
-
-def _toml_value(text: str) -> object:
-    """``text`` as one TOML value, or as it stands."""
-    try:
-        parsed = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):
-        return text.strip()
-    return parsed["value"] if len(parsed) == 1 else text.strip()
 
 
 def _read(path: Path, here: Origin) -> Changes:

@@ -41,6 +41,10 @@ FigureName = Literal[
     "horizon",
     "compare",
     "density",
+    "before-after",
+    "modes",
+    "frontier",
+    "trust",
     "spectrum",
 ]
 ImageFormat = Literal["png", "svg", "pdf"]
@@ -206,10 +210,10 @@ class Evaluate:
 
 @dataclass(frozen=True)
 class Series:
-    """What one of several artefacts is called in a figure, and the order of its basis where it is drawn against it."""
+    """What one of several artefacts is called in a figure, and where it stands on the axis that it is drawn against."""
 
     label: str
-    order: int | None = None
+    at: float | None = None
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ class Source:
     """One drawn artefact: what it is called among several, and the records of it and of what it was made from."""
 
     label: str
-    order: int | None
+    at: float | None
     records: Mapping[str, Any]
 
 
@@ -33,7 +33,7 @@ def sources_of(settings: Plot, inputs: Mapping[str, Any]) -> list[Source]:
         number, _, role = name.partition("/")
         records.setdefault(int(number), {})[role] = record
     series = settings.series or (Series(""),) * len(records)
-    return [Source(one.label, one.order, records[i]) for i, one in enumerate(series)]
+    return [Source(one.label, one.at, records[i]) for i, one in enumerate(series)]
 
 
 @dataclass(frozen=True)

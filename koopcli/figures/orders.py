@@ -39,7 +39,7 @@ def select(sources: Sequence[Source], settings: Plot) -> list[OrderErrors]:
     groups: dict[str, list[tuple[int, dict[str, float]]]] = {}
     for source in sources:
         score = source.records["evaluation"].figures()["rmse"]
-        groups.setdefault(source.label, []).append((source.order or 0, score))
+        groups.setdefault(source.label, []).append((round(source.at or 0), score))
     found = []
     for label, members in groups.items():
         ordered = sorted(members, key=lambda member: member[0])

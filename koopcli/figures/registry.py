@@ -24,8 +24,9 @@ class FigureKind:
     ``takes``: the artefacts it draws, a ``fit`` being a predictor with lifted states; ``roles``: of each artefact,
     itself or what it was made from: ``evaluation``, ``predictor``, ``trajectories`` (the test set), ``training``,
     ``sample``. ``made``: what it makes when none is named, one of ``koopcli.stages.drawn.MADE``. ``draws``: one
-    artefact, several ``beside`` one another on one test set, or several as ``points`` of curves against the order.
-    ``kinds``: of a sample, those it may be of. ``told``: fields of ``Plot`` that it uses.
+    artefact, several ``beside`` one another on one test set, or several as ``points`` of curves ``against`` one of
+    ``koopcli.stages.naming.AXES``. ``kinds``: of a sample, those it may be of. ``told``: fields of ``Plot`` that it
+    uses.
     """
 
     about: str
@@ -33,6 +34,7 @@ class FigureKind:
     roles: tuple[str, ...]
     made: str
     draws: Literal["one", "beside", "points"] = "one"
+    against: str = "order"
     kinds: tuple[str, ...] = ()
     told: tuple[str, ...] = ()
 
@@ -106,6 +108,32 @@ FIGURES: dict[str, FigureKind] = {
     ),
     "density": FigureKind(
         "RMSE against the distance of the initial state to the data", "evaluation", ("evaluation",), "eigen"
+    ),
+    "before-after": FigureKind(
+        "the errors of several predictors by initial state, side by side",
+        "evaluation",
+        ("evaluation",),
+        "improved",
+        draws="beside",
+    ),
+    "modes": FigureKind(
+        "what the fit misses, and RMSE, against the number of rates",
+        "evaluation",
+        ("evaluation", "predictor"),
+        "modes",
+        draws="points",
+        against="modes",
+    ),
+    "frontier": FigureKind(
+        "RMSE against simulated seconds, of every vehicle",
+        "evaluation",
+        ("evaluation",),
+        "budgets",
+        draws="points",
+        against="seconds",
+    ),
+    "trust": FigureKind(
+        "errors and the bounds that the predictor gives for them", "evaluation", ("evaluation", "predictor"), "trusted"
     ),
     "spectrum": FigureKind(
         "eigenvalues of a predictor beside the unit circle and the half plane", "fit", ("predictor",), "edmd-fit"

@@ -86,7 +86,7 @@ class Futures:
 
     @property
     def _table_bytes(self) -> float:
-        return 8.0 * len(self.nodes.kept) * self.projection.shape[1] * float(self.trajectories.shape[2])
+        return 8.0 * len(self.nodes.kept) * float(self.projection.shape[1] * self.trajectories.shape[2])
 
     @cached_property
     def _values(self) -> FloatArray:

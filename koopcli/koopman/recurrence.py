@@ -53,22 +53,28 @@ def check_recurrence(x: FloatArray, dt: float, surface: Surface | None = None) -
 
     Initial states of one energy, or of a few, are closed surfaces; every trajectory must leave its own at once and stay
     inside of it. How many there are is returned, or None where the states lie on none. In any case no path may lead
-    through an initial state.
+    through an initial state of its own surface.
     """
-    levels = None
+    levels, of = None, np.zeros(len(x), dtype=np.intp)
     if surface is not None:
-        level = np.sort(surface.energy(x[:, 0]))
-        count = 1 + int((np.diff(level) > ONE_LEVEL * level.max()).sum())
+        energy = surface.energy(x[:, 0])
+        order = np.argsort(energy, kind="stable")
+        gaps = np.diff(energy[order]) > ONE_LEVEL * energy.max()
+        count = 1 + int(gaps.sum())
         if count == 1 or count * SHARED <= len(x):
             _stay_below(x, dt, surface)
             levels = count
-    found = _passes_a_start(x)
-    if found is not None:
-        raise InvalidValueError(
-            f"trajectory {found.trajectory} comes back at {found.sample * dt:g} s to the initial state of trajectory "
-            f"{found.start}, {_text(x[found.start, 0])}: eigenfunctions need initial states that no trajectory returns "
-            "to; shorten the trajectories or choose other initial states"
-        )
+            of[order[1:]] = np.cumsum(gaps)
+    for one in np.unique(of):
+        members = np.flatnonzero(of == one)
+        found = _passes_a_start(x[members])
+        if found is not None:
+            start = members[found.start]
+            raise InvalidValueError(
+                f"trajectory {members[found.trajectory]} comes back at {found.sample * dt:g} s to the initial state of "
+                f"trajectory {start}, {_text(x[start, 0])}: eigenfunctions need initial states that no trajectory "
+                "returns to; shorten the trajectories or choose other initial states"
+            )
     return levels
 
 

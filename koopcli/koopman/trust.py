@@ -45,7 +45,8 @@ class Trust:
         """
         found = np.full(len(x), np.nan)
         finite = np.isfinite(x).all(axis=1)
-        near = self._tree.query(self._search.place(x[finite]), _neighbours(len(self.states)))[1]
+        count = min(NEIGHBOURS, len(self.states))
+        near = self._tree.query(self._search.place(x[finite]), count)[1].reshape(-1, count)
         found[finite] = self.factor * np.exp(np.log(self.errors)[near].mean(axis=1))
         return found
 
@@ -101,18 +102,22 @@ def held_back(
         part = Futures(futures.trajectories, rest, futures.frame, futures.projection, futures.modes)
         error[rows] = rmse(predict(part, x[rows]), truth[rows])
     scored = np.isfinite(error)
-    return calibrated(x[scored], np.maximum(error[scored], SMALLEST), nodes.search.scale, nodes.search.power)
+    scale, power = nodes.search.scale, nodes.search.power
+    return calibrated(x[scored], np.maximum(error[scored], SMALLEST), groups[j[scored]], scale, power)
 
 
-def calibrated(x: FloatArray, error: FloatArray, scale: FloatArray, power: float) -> Trust:
-    """The estimate from ``error`` (m,) in percent at ``x`` (m, n_x), with a factor found by leaving each out."""
+def calibrated(x: FloatArray, error: FloatArray, groups: IndexArray, scale: FloatArray, power: float) -> Trust:
+    """The estimate from ``error`` (m,) in percent at ``x`` (m, n_x).
+
+    Its factor is found by estimating each from those of other ``groups`` (m,): a state that is asked for is on no known
+    trajectory either.
+    """
     trust = Trust(x, error, scale, power, 1.0)
-    count = _neighbours(len(x) - 1)
-    near = trust._tree.query(trust._search.place(x), count + 1)[1][:, 1:]
-    ratio = np.log(error) - np.log(error)[near].mean(axis=1)
+    largest = int(np.unique(groups, return_counts=True)[1].max())
+    pool = min(len(x), NEIGHBOURS + largest)
+    near = trust._tree.query(trust._search.place(x), pool)[1].reshape(len(x), pool)
+    others = groups[near] != groups[:, np.newaxis]
+    counted = others & (np.cumsum(others, axis=1) <= NEIGHBOURS)
+    size = np.log(error)
+    ratio = size - (size[near] * counted).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
     return Trust(x, error, scale, power, float(np.exp(np.quantile(ratio, LEVEL, method="higher"))))
-
-
-def _neighbours(states: int) -> int:
-    """How many of ``states`` are averaged; a list of one neighbour is still a list."""
-    return max(2, min(NEIGHBOURS, states))

@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from koopcli.config.experiment import flat, parse_set
+from koopcli.config.changes import flat, parse_set
 from koopcli.errors import InvalidValueError, UsageError
 from koopcli.figures.drawing import Drawing
 from koopcli.figures.registry import FIGURES

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from koopcli.config.experiment import Experiment
@@ -18,12 +18,15 @@ REDUCED = "This run is not of the paper's size: its figures cannot be put beside
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts: figures that stand in columns, or ``words`` of several lines that are read across."""
+    """A table of texts: figures that stand in columns, the first ``left`` of which are names, or ``words`` of
+    several lines that are read across.
+    """
 
     title: str
     header: list[str]
     rows: list[list[str]]
     words: bool = False
+    left: int = 1
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,8 @@ class Scored:
     cell: Any
     figures: Meta
     record: Record
+    measured: Mapping[str, float] = field(default_factory=dict)
+    """What the method measured of it in this run, which is in no artefact."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +80,8 @@ class Method:
     """Settings that the method sweeps over or fixes, and what to write instead."""
     uses: Callable[[str], bool]
     """Whether a setting has an effect on the method."""
+    measure: Callable[[Pipeline, Any, Task], Mapping[str, float]] | None = None
+    """What is measured of a cell beside its evaluation."""
     reads: Sequence[str] = ()
     """Settings of fits that some of its cells have a use for, whatever the experiment's own fit has."""
 
@@ -93,7 +100,8 @@ def run_cells(method: Method, run: Run, pipeline: Pipeline) -> Run:
         for i, (cell, task) in enumerate(cells):
             progress(i, len(cells))
             artefact = pipeline.make(task)
-            scored.append(Scored(cell, artefact.figures, artefact.record))
+            measured = method.measure(pipeline, cell, task) if method.measure is not None else {}
+            scored.append(Scored(cell, artefact.figures, artefact.record, measured))
     return replace(run, scored=tuple(scored))
 
 

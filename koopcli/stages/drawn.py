@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from koopcli.checks import build
-from koopcli.config.experiment import Experiment, flat
-from koopcli.config.samples import INPUTS, SAMPLED_FOR, BoxSample, PointSample
+from koopcli.config.experiment import Experiment
+from koopcli.config.samples import SAMPLED_FOR
 from koopcli.config.settings import ImageFormat, Plot, Series, Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError
 from koopcli.figures import source_digest
 from koopcli.figures.registry import FIGURES, FigureKind
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
-from koopcli.stages.makers import LIFTED, MAKERS, prospect
+from koopcli.stages.makers import LIFTED, MAKERS
+from koopcli.stages.naming import names, points
 from koopcli.vehicles.plants import PLANTS
 
 TAKES: dict[str, tuple[str, ...]] = {
@@ -61,6 +62,29 @@ MADE: dict[str, Made] = {
         fixed=("fit-edmd.", "baseline."),
         instead="it sets eigenfunctions beside fixed baselines and EDMD fits; name evaluations to choose others",
     ),
+    "improved": Made(
+        lambda experiment: [recipes.evaluation(experiment, fit) for fit in recipes.improved(experiment)],
+        reads=("reproduce.budgets",),
+        fixed=("fit-eigen.",),
+        instead="it sets the paper's reading beside the experiment best-eigen; name evaluations to choose others",
+    ),
+    "trusted": Made(
+        lambda experiment: [recipes.evaluation(experiment, recipes.improved(experiment)[-1])],
+        fixed=("fit-eigen.", "sample."),
+        instead="it draws the experiment best-eigen; name an evaluation to choose another",
+    ),
+    "modes": Made(
+        recipes.mode_sweep,
+        reads=("reproduce.pairs",),
+        fixed=("fit-eigen.eigenvalues", "fit-eigen.pairs", "fit-eigen.degree"),
+        instead="it sweeps the degree of the lattice and reproduce.pairs",
+    ),
+    "budgets": Made(
+        recipes.budget_sweep,
+        reads=("reproduce.budgets", "reproduce.beside"),
+        fixed=("fit-eigen.", "sample."),
+        instead="it draws the experiment best-eigen on reproduce.budgets; name evaluations to choose others",
+    ),
     "edmd-fit": Made(lambda experiment: [recipes.fit_edmd(experiment)]),
     "surface": Made(lambda experiment: [recipes.sample(experiment.sample("ellipsoid"))]),
     "vehicles": Made(
@@ -83,10 +107,12 @@ def figure(
     image: ImageFormat,
     experiment: Experiment,
     simulated: Callable[[Task], Simulate] = simulated,
+    labels: Mapping[Task, str] | None = None,
 ) -> Task:
     """The figure ``name`` of ``artefacts``, told what ``experiment`` says.
 
-    ``simulated`` finds the simulation behind a predictor. Raises ``UnknownNameError`` for samples of another kind;
+    ``simulated`` finds the simulation behind a predictor; ``labels`` are what artefacts are called, where their
+    settings are not to say it. Raises ``UnknownNameError`` for samples of another kind;
     ``InvalidValueError`` for more artefacts than the figure draws, for evaluations on different test sets, and for two
     that would be one point of one curve.
     """
@@ -102,7 +128,7 @@ def figure(
     )
     told = {field: TOLD[field](experiment) for field in kind.told}
     about = {"figure": name, "format": image, "drawn_by": source_digest()}
-    return Task("plot", build(Plot, {**about, "series": _series(name, kind, artefacts), **told}), inputs)
+    return Task("plot", build(Plot, {**about, "series": _series(kind, artefacts, experiment, labels), **told}), inputs)
 
 
 def _check(name: str, kind: FigureKind, artefacts: Sequence[Task]) -> None:
@@ -165,7 +191,9 @@ def _behind(task: Task, role: str, experiment: Experiment, simulated: Callable[[
     return recipes.driven(experiment, simulated(task)) if role == "trajectories" else task
 
 
-def _series(name: str, kind: FigureKind, artefacts: Sequence[Task]) -> tuple[Series, ...]:
+def _series(
+    kind: FigureKind, artefacts: Sequence[Task], experiment: Experiment, labels: Mapping[Task, str] | None
+) -> tuple[Series, ...]:
     """What each of several artefacts is called; nothing where the figure draws one."""
     if kind.draws == "one":
         return ()
@@ -173,73 +201,16 @@ def _series(name: str, kind: FigureKind, artefacts: Sequence[Task]) -> tuple[Ser
         if list(artefacts).count(task) > 1:
             raise InvalidValueError(f"{task.name} is named twice: name each evaluation once")
     if kind.draws == "points":
-        series = _points(name, artefacts)
+        series = points(kind.against, artefacts, experiment)
+    elif labels is not None:
+        series = tuple(Series(labels[task]) for task in artefacts)
     else:
-        series = tuple(Series(label) for label in _names([task.input("predictor") for task in artefacts]))
+        series = tuple(Series(label) for label in names([task.input("predictor") for task in artefacts]))
     for one in series:
         if series.count(one) > 1:
-            what = one.label if one.order is None else f"order {one.order}, {one.label}"
+            what = one.label if one.at is None else f"{kind.against} {one.at:g}, {one.label}"
             raise InvalidValueError(f"several evaluations of {what}: name each once, and those of one experiment")
     return series
-
-
-def _points(name: str, evaluations: Sequence[Task]) -> tuple[Series, ...]:
-    """Points of curves; those of one curve differ in the order alone, or it is told apart by what else differs."""
-    points = [_point(name, task) for task in evaluations]
-    found = list(points)
-    for label in dict.fromkeys(point.label for point in points):
-        group = [i for i, point in enumerate(points) if point.label == label]
-        said = _differing([_of_a_point(evaluations[i]) for i in group])
-        for i, words in zip(group, said, strict=True):
-            found[i] = Series(", ".join([label, *words]), points[i].order)
-    return tuple(found)
-
-
-def _of_a_point(evaluation: Task) -> dict[str, Any]:
-    """Every setting that two points of one curve have in common."""
-    found = dict(_settings(evaluation.input("predictor")))
-    del found["fit-edmd.order"]
-    found |= {f"test/{name}": value for name, value in _settings(evaluation.input("trajectories"))}
-    return found | {"first": evaluation.settings.first, "restart": evaluation.settings.restart}
-
-
-def _differing(settings: Sequence[Mapping[str, Any]]) -> list[list[str]]:
-    """Of each of several ``settings`` those that are not the same in all, in words, each once."""
-    names = [key for key in settings[0] if any(one.get(key) != settings[0][key] for one in settings)]
-    return [list(dict.fromkeys(f"{key.split('.')[-1]} {_short(one.get(key))}" for key in names)) for one in settings]
-
-
-def _point(name: str, evaluation: Task) -> Series:
-    """The curve that an evaluation belongs to, and its place on it."""
-    about = prospect(evaluation.input("predictor"))
-    if about.order is None:
-        raise InvalidValueError(
-            f"the figure '{name}' takes evaluations of EDMD predictors, which have an order, not of {about.name}"
-        )
-    test = evaluation.input("trajectories").ancestor("sample").settings
-    inputs = INPUTS[test.excitation] if isinstance(test, (BoxSample, PointSample)) else test.kind
-    return Series(f"{about.data}, {inputs}", about.order)
-
-
-def _names(predictors: Sequence[Task]) -> list[str]:
-    """What predictors are called; those of one name are told apart by the settings in which they differ."""
-    names = [prospect(task).name for task in predictors]
-    found = list(names)
-    for name in dict.fromkeys(names):
-        group = [i for i, other in enumerate(names) if other == name]
-        for i, words in zip(group, _differing([dict(_settings(predictors[i])) for i in group]), strict=True):
-            found[i] = ", ".join([name, *words])
-    return found
-
-
-def _settings(task: Task) -> Iterator[tuple[str, Any]]:
-    """Every setting of a task and of what is behind it, by its full name."""
-    for step in task.upstream():
-        yield from ((f"{step.stage}.{key}", value) for key, value in flat(asdict(step.settings)))
-
-
-def _short(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 TOLD: Mapping[str, Callable[[Experiment], Any]] = {

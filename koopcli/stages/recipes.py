@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import get_args
 
 from koopcli.checks import build
-from koopcli.config.experiment import Experiment
-from koopcli.config.samples import CUSTOMS, SAMPLED_FOR, GridSample, Kind, SampleSettings
-from koopcli.config.settings import OF_BASIS, Baseline, BaselineKind, FitEdmd, Simulate, Tyres
+from koopcli.config.experiment import Experiment, load_experiment
+from koopcli.config.samples import CUSTOMS, SAMPLED_FOR, GreedySample, GridSample, Kind, SampleSettings
+from koopcli.config.settings import OF_BASIS, Baseline, BaselineKind, Eigenvalues, FitEdmd, FitEigen, Simulate, Tyres
 from koopcli.errors import InvalidValueError
 from koopcli.records import Meta
 from koopcli.stages.base import Task
@@ -115,6 +115,54 @@ def draw_sweep(experiment: Experiment) -> list[Task]:
         training = simulation(experiment, sample(replace(grid, seed=seed)))
         fits = (fit_edmd(with_order(experiment, order), training) for order in experiment.reproduce.orders)
         found += [evaluation(experiment, fit) for fit in fits]
+    return found
+
+
+DEGREES = (1, 2, 3)  # of the lattice, where modes are swept
+
+
+def mode_sweep(experiment: Experiment) -> list[Task]:
+    """One evaluation for each number of rates, of every kind; the best boundary values unless windows are fitted."""
+    fits = [replace(experiment.fit_eigen, eigenvalues="dmd", degree=degree) for degree in DEGREES]
+    kinds: tuple[Eigenvalues, ...] = ("comb", "varpro")
+    fits += [
+        replace(experiment.fit_eigen, eigenvalues=kind, pairs=pairs)
+        for kind in kinds
+        for pairs in experiment.reproduce.pairs
+    ]
+    fits = [fit if fit.window == "horizon" else replace(fit, boundary="optimal") for fit in fits]
+    return [evaluation(experiment, fit_eigen(replace(experiment, fit_eigen=fit))) for fit in fits]
+
+
+def best_eigen(there: Experiment, budget: float | None = None) -> Experiment:
+    """The experiment with the sample and the fit of best-eigen, for its own vehicle and period and its main budget."""
+    main = there.reproduce.budgets[0]
+    best = load_experiment("best-eigen", {"sample": {"greedy": {"budget": main if budget is None else budget}}})
+    simulate = replace(there.simulate, plant=None, steps=None)
+    return replace(best, simulate=simulate, evaluate=there.evaluate)
+
+
+def improved(experiment: Experiment) -> list[Task]:
+    """The paper's reading with the best boundary values, and the best predictor."""
+    paper = replace(experiment, fit_eigen=FitEigen(boundary="optimal", cut=1e-10))
+    return [fit_eigen(paper, simulation(paper, plant="slips")), fit_eigen(best_eigen(experiment))]
+
+
+def budget_sweep(experiment: Experiment) -> list[Task]:
+    """The best predictor on every budget, with and without mirror images, for every vehicle shown."""
+    found = []
+    for _, there in vehicles(experiment):
+        for budget in experiment.reproduce.budgets:
+            best = best_eigen(there, budget)
+            for mirrored in (True, False):
+                states = best.sample("greedy")
+                assert isinstance(states, GreedySample)
+                chosen = replace(states, mirror=states.mirror if mirrored else ())
+                fit = replace(best.fit_eigen, mirror=best.fit_eigen.mirror if mirrored else ())
+                training = simulation(best, sample(chosen), plant="slips")
+                predictor = fit_eigen(replace(best, fit_eigen=fit), training)
+                test = test_set(experiment, predictor.ancestor("simulate").settings)
+                found.append(evaluation(experiment, predictor, test))
     return found
 
 

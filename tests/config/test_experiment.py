@@ -7,8 +7,9 @@ from typing import get_args, get_type_hints
 import pytest
 
 from koopcli.config import plants, samples, settings
+from koopcli.config.changes import SECTIONS, parse_set
 from koopcli.config.data import data_folder
-from koopcli.config.experiment import SECTIONS, load_experiment, parse_set
+from koopcli.config.experiment import load_experiment
 from koopcli.config.samples import SAMPLES, BoxSample, GridSample
 from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, PlotOptions, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError, UsageError

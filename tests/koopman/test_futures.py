@@ -201,7 +201,7 @@ def test_a_bound_covers_what_it_says():
         return np.exp(3 * np.linalg.norm(x / scale, axis=1) + 0.5 * rng.standard_normal(len(x)))
 
     known, asked = sampling.ball(1, 3000) * scale, sampling.ball(2, 4000) * scale
-    trust = calibrated(known, errors(known), scale, 1.0)
+    trust = calibrated(known, errors(known), np.arange(3000), scale, 1.0)
     bound, actual = trust.bound(asked), errors(asked)
     assert (actual <= bound).mean() == pytest.approx(LEVEL, abs=0.02)
     middle = np.linalg.norm(asked / scale, axis=1) < 0.5

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from koopcli.config.experiment import load_experiment, parse_set
+from koopcli.config.changes import parse_set
+from koopcli.config.experiment import load_experiment
 from koopcli.errors import DamagedArtefactError, NewerFormatError, UnknownNameError
 from koopcli.koopman import evaluation
 from koopcli.progress import silent
@@ -206,7 +207,7 @@ def test_an_interrupted_evaluation_goes_on_where_it_stopped(fresh, monkeypatch):
         if len(calls) == 3:
             raise KeyboardInterrupt
         calls.append(rows)
-        return real(predictor, trajectories, rows, first, restart)
+        return real(predictor, trajectories, rows, first, *more)
 
     from koopcli.stages import evaluate as stage
 

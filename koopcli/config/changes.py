@@ -1,0 +1,72 @@
+"""What is changed of an experiment: ``--set stage.key=value``, as nested tables and as full names."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from koopcli.checks import candidates
+from koopcli.errors import UsageError
+
+SECTIONS = (
+    "vehicle",
+    "sample",
+    "simulate",
+    "fit-edmd",
+    "fit-eigen",
+    "baseline",
+    "test",
+    "evaluate",
+    "plot",
+    "reproduce",
+)
+
+Values = dict[str, Any]
+Changes = dict[str, Values]  # section -> setting -> raw value, or a table of them
+
+
+def parse_set(assignments: Sequence[str]) -> Changes:
+    """``--set stage.key=value`` as changes; the value is TOML, or plain text where it is none."""
+    given = []
+    for text in assignments:
+        name, equals, raw = text.partition("=")
+        section, *keys = name.strip().split(".")
+        if not (equals and keys and all(keys)):
+            raise UsageError(f"--set {text}: write --set stage.key=value, such as --set vehicle.Jzz=1731")
+        if section not in SECTIONS:
+            raise UsageError(f"--set {text}: unknown stage '{section}'{candidates(section, SECTIONS)}")
+        given.append((name.strip(), _toml_value(raw)))
+    return nested(given)
+
+
+def nested(named: Iterable[tuple[str, Any]]) -> Changes:
+    """Changes from full names such as ``vehicle.lateral.mu``: the inverse of :func:`flat`."""
+    changes: Changes = {}
+    for name, value in named:
+        section, *keys = name.split(".")
+        table = changes.setdefault(section, {})
+        for key in keys[:-1]:
+            table = table.setdefault(key, {})
+            if not isinstance(table, dict):
+                raise UsageError(f"--set {name}: '{key}' is given a value of its own as well")
+        table[keys[-1]] = value
+    return changes
+
+
+def flat(changes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Every changed setting by its full name, such as ``vehicle.lateral.mu``, with its raw value."""
+    for key, value in changes.items():
+        if isinstance(value, Mapping):
+            yield from flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _toml_value(text: str) -> object:
+    """``text`` as one TOML value, or as it stands."""
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text.strip()
+    return parsed["value"] if len(parsed) == 1 else text.strip()

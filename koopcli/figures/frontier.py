@@ -1,0 +1,83 @@
+"""What error simulated seconds pay for: a panel for each vehicle, a line for each method."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from koopcli.config.settings import Plot
+from koopcli.errors import InvalidValueError
+from koopcli.figures.colours import MARKERS
+from koopcli.figures.drawing import Source, column
+from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
+from koopcli.records import Array, FloatArray
+
+PANEL = 2.3  # inches
+
+
+@dataclass(frozen=True)
+class Frontier:
+    """Mean errors in percent of one ``method`` on one ``vehicle``, by rising ``seconds``."""
+
+    vehicle: str
+    method: str
+    seconds: FloatArray
+    mean: FloatArray
+
+
+def select(sources: Sequence[Source], settings: Plot) -> list[Frontier]:
+    """Evaluations by vehicle and method, which a label has before and after its colon.
+
+    Raises ``InvalidValueError`` where every prediction of every evaluation diverged.
+    """
+    groups: dict[str, list[tuple[float, float]]] = {}
+    for source in sources:
+        mean = source.records["evaluation"].figures()["rmse"]["mean"]
+        groups.setdefault(source.label, []).append((source.at or 0.0, mean))
+    found = []
+    for label, members in groups.items():
+        vehicle, colon, method = label.partition(": ")
+        seconds, mean = np.array(sorted(members)).T
+        found.append(Frontier(vehicle if colon else "", method if colon else vehicle, seconds, mean))
+    if not any(np.isfinite(one.mean).any() for one in found):
+        raise InvalidValueError("every prediction of these evaluations diverged: there is no error to draw")
+    return found
+
+
+def numbers(shown: Sequence[Frontier]) -> Mapping[str, Array]:
+    """Seconds and mean error of each line."""
+    found: dict[str, Array] = {}
+    for one in shown:
+        name = f"{one.vehicle}: {one.method}" if one.vehicle else one.method
+        found[f"{name}/simulated"] = column(one.seconds, "budget", "s")
+        found[f"{name}/mean"] = column(one.mean, "budget", "%")
+    return found
+
+
+def draw(shown: Sequence[Frontier]) -> Figure:
+    """Panels below one another, which share their axes; a method has one colour and mark in all of them."""
+    vehicles, methods = (list(dict.fromkeys(getattr(one, name) for one in shown)) for name in ("vehicle", "method"))
+    look = dict(zip(methods, looks(len(methods)), strict=True))
+    mark = {method: MARKERS[i % len(MARKERS)] for i, method in enumerate(methods)}
+    with style():
+        figure = Figure(figsize=(COLUMN, 0.7 + PANEL * len(vehicles)), layout="constrained")
+        panels = figure.subplots(len(vehicles), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+        named: set[str] = set()
+        for axes, vehicle in zip(panels, vehicles, strict=True):
+            for one in (one for one in shown if one.vehicle == vehicle):
+                label = None if one.method in named else plain(one.method)
+                named.add(one.method)
+                axes.plot(one.seconds, one.mean, marker=mark[one.method], label=label, **look[one.method])
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.set_ylabel("mean RMSE (%)")
+            if vehicle:
+                axes.set_title(plain(vehicle), fontsize=8)
+        plain_numbers(panels[0].yaxis)
+        plain_numbers(panels[-1].xaxis)
+        panels[-1].set_xlabel("simulated seconds of training")
+        legend_below(figure, columns=1)
+    return figure

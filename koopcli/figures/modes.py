@@ -1,0 +1,71 @@
+"""How many rates pay: what the fit misses of the data, and the error of the prediction, against their number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from koopcli.config.settings import Plot
+from koopcli.errors import InvalidValueError
+from koopcli.figures.colours import MARKERS
+from koopcli.figures.drawing import Source, column
+from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
+from koopcli.koopman.predictor import Predictor
+from koopcli.records import Array, FloatArray
+
+
+@dataclass(frozen=True)
+class ModeErrors:
+    """By rising number of ``modes`` of one kind: what the fit ``missed`` and the ``mean`` RMSE, in percent."""
+
+    label: str
+    modes: FloatArray
+    missed: FloatArray
+    mean: FloatArray
+
+
+def select(sources: Sequence[Source], settings: Plot) -> list[ModeErrors]:
+    """Evaluations grouped by label. Raises ``InvalidValueError`` where every prediction of all of them diverged."""
+    groups: dict[str, list[tuple[float, float, float]]] = {}
+    for source in sources:
+        predictor: Predictor = source.records["predictor"]
+        mean = source.records["evaluation"].figures()["rmse"]["mean"]
+        missed = np.nan if predictor.missed is None else predictor.missed
+        groups.setdefault(source.label, []).append((source.at or 0.0, missed, mean))
+    found = [ModeErrors(label, *np.array(sorted(members)).T) for label, members in groups.items()]
+    if not any(np.isfinite(one.mean).any() for one in found):
+        raise InvalidValueError("every prediction of these evaluations diverged: there is no error to draw")
+    return found
+
+
+def numbers(shown: Sequence[ModeErrors]) -> Mapping[str, Array]:
+    """Modes, what is missed and the mean error of each kind."""
+    found: dict[str, Array] = {}
+    for one in shown:
+        found[f"{one.label}/modes"] = column(one.modes, "fit", "1")
+        found[f"{one.label}/missed"] = column(one.missed, "fit", "%")
+        found[f"{one.label}/mean"] = column(one.mean, "fit", "%")
+    return found
+
+
+def draw(shown: Sequence[ModeErrors]) -> Figure:
+    """Both against the number of modes, one above the other."""
+    with style():
+        figure = Figure(figsize=(COLUMN, 4.2), layout="constrained")
+        fit, prediction = figure.subplots(2, 1, sharex=True)
+        for i, (one, look) in enumerate(zip(shown, looks(len(shown)), strict=True)):
+            marker = MARKERS[i % len(MARKERS)]
+            fit.plot(one.modes, one.missed, marker=marker, label=plain(one.label), **look)
+            prediction.plot(one.modes, one.mean, marker=marker, **look)
+        for axes, name in ((fit, "missed by the fit (%)"), (prediction, "mean RMSE (%)")):
+            axes.set_yscale("log")
+            plain_numbers(axes.yaxis)
+            axes.set_ylabel(name)
+        prediction.xaxis.set_major_locator(MaxNLocator(integer=True))
+        prediction.set_xlabel("real modes of one state")
+        legend_below(figure, columns=3)
+    return figure
