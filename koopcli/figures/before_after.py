@@ -3,52 +3,84 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from koopcli.config.settings import Plot
-from koopcli.figures.balls import Balls, balls, columns
+from koopcli.figures.balls import LARGEST_SHOWN
 from koopcli.figures.colours import SHADES
-from koopcli.figures.drawing import Source
-from koopcli.figures.style import axis_label, plain, style
-from koopcli.records import Array
+from koopcli.figures.drawing import LOST, Source, column, state_columns, with_error
+from koopcli.figures.style import COLUMN, axis_label, plain, plain_numbers, style
+from koopcli.koopman.evaluation import Evaluation
+from koopcli.records import Array, Channels, FloatArray
 
-PANEL = 2.1  # inches
 LEAST = 0.02  # quantile of all errors where the colours begin
 FAINTEST = 1e-6  # percent
+VIEWS = ((0, 1), (1, 2))  # states across and up: from above, and from the side
 
 
-def select(sources: Sequence[Source], settings: Plot) -> list[tuple[str, Balls]]:
-    """What the figure shows. Raises ``InvalidValueError`` where every prediction of one evaluation diverged."""
-    return [(source.label, balls(source)) for source in sources]
+@dataclass(frozen=True)
+class Errors:
+    """The ``rmse`` (n,) in percent of the predictions from ``x0`` (n, n_x), the largest last; none where every
+    prediction diverged, which the ``label`` then says.
+    """
+
+    label: str
+    x0: FloatArray
+    rmse: FloatArray
+    channels: Channels
 
 
-def numbers(shown: Sequence[tuple[str, Balls]]) -> Mapping[str, Array]:
+def select(sources: Sequence[Source], settings: Plot) -> list[Errors]:
+    """What the figure shows. Raises ``InvalidValueError`` where every prediction of all evaluations diverged."""
+    found = []
+    for source, shown in zip(sources, with_error(sources), strict=True):
+        evaluation: Evaluation = source.records["evaluation"]
+        order = np.argsort(evaluation.rmse[shown], kind="stable")
+        label = source.label if shown.any() else source.label + LOST
+        x0, rmse = evaluation.x0[shown][order], evaluation.rmse[shown][order]
+        found.append(Errors(label, x0, rmse, evaluation.state_channels))
+    return found
+
+
+def numbers(shown: Sequence[Errors]) -> Mapping[str, Array]:
     """Every initial state with its error, of each predictor."""
-    return {f"{label}/{name}": array for label, one in shown for name, array in columns(one).items()}
+    found: dict[str, Array] = {}
+    for one in shown:
+        found |= state_columns(one.x0, one.channels, "trajectory", f"{one.label}/{{}}_0")
+        found[f"{one.label}/rmse"] = column(one.rmse, "trajectory", "%")
+    return found
 
 
-def draw(shown: Sequence[tuple[str, Balls]]) -> Figure:
-    """From above and from the side, a column for each predictor; the largest errors on top."""
-    errors = np.concatenate([one.rmse for _, one in shown])
+def draw(shown: Sequence[Errors]) -> Figure:
+    """A column for each predictor, from above and from the side; the largest errors on top."""
+    errors = np.concatenate([one.rmse for one in shown])
     low = max(float(np.quantile(errors, LEAST)), FAINTEST)
-    shades = ScalarMappable(LogNorm(low, max([2 * low, *(one.top for _, one in shown)])), SHADES)
+    top = max(2 * low, float(np.quantile(errors, LARGEST_SHOWN)))
+    shades = ScalarMappable(LogNorm(low, top), SHADES)
     with style():
-        figure = Figure(figsize=(0.5 + PANEL * len(shown), 4.9), layout="constrained")
-        panels = figure.subplots(2, len(shown), sharex="row", sharey="row", squeeze=False)
-        for (label, one), pair in zip(shown, panels.T, strict=True):
-            names = [axis_label(n, u) for n, u in zip(one.channels.names, one.channels.units, strict=True)]
+        figure = Figure(figsize=(COLUMN, 4.6), layout="constrained")
+        panels = figure.subplots(len(VIEWS), len(shown), sharex="row", sharey="row", squeeze=False)
+        names = [axis_label(n, u) for n, u in zip(shown[0].channels.names, shown[0].channels.units, strict=True)]
+        for one, column_ in zip(shown, panels.T, strict=True):
+            mean = f"\nmean {one.rmse.mean():.3g} %" if len(one.rmse) else ""
+            column_[0].set_title(f"{plain(one.label)}{mean}", fontsize=8)
             colours = shades.to_rgba(np.maximum(one.rmse, low))
-            pair[0].set_title(f"{plain(label)}, mean {one.rmse.mean():.3g} %", fontsize=8)
-            for axes, (across, up) in zip(pair, ((0, 1), (1, 2)), strict=True):
-                axes.scatter(
-                    one.x0[:, across], one.x0[:, up], s=4, color=colours, linewidths=0, zorder=3, rasterized=True
-                )
+            for axes, (across, up) in zip(column_, VIEWS, strict=True):
+                at = one.x0[:, across], one.x0[:, up]
+                axes.scatter(*at, s=3, color=colours, linewidths=0, zorder=3, rasterized=True)
+                axes.xaxis.set_major_locator(MaxNLocator(4))
+        for row, (across, up) in zip(panels, VIEWS, strict=True):
+            row[0].set_ylabel(names[up])
+            for axes in row:
                 axes.set_xlabel(names[across])
-                if pair[0] is panels[0, 0]:
-                    axes.set_ylabel(names[up])
-        figure.colorbar(shades, ax=list(panels.ravel()), location="bottom", label="RMSE (%)", extend="both", aspect=35)
+        bar = figure.colorbar(
+            shades, ax=list(panels.ravel()), location="bottom", label="RMSE (%)", extend="both", aspect=35
+        )
+        plain_numbers(bar.ax.xaxis)
     return figure

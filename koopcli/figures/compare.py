@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from koopcli.config.settings import Plot
 from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import Source, column, with_error
-from koopcli.figures.style import COLUMN, plain_numbers, style
+from koopcli.figures.style import COLUMN, LINE, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray
 
 WIDEST = 34  # letters of a name in a line
@@ -57,7 +57,7 @@ def numbers(shown: Sequence[Spread]) -> Mapping[str, Array]:
 def draw(shown: Sequence[Spread]) -> Figure:
     """A row for each predictor, in the order given: box and whiskers with the mean, which is written beside it."""
     with style():
-        figure = Figure(figsize=(COLUMN, 1.0 + 0.3 * len(shown)), layout="constrained")
+        figure = Figure(figsize=(COLUMN, 1.0 + 0.3 * len(shown) + LINE * _wrapped(shown)), layout="constrained")
         axes = figure.subplots()
         first_drawn = next(row for row, one in enumerate(shown) if np.isfinite(one.mean))
         for row, one in enumerate(shown):
@@ -91,6 +91,11 @@ def draw(shown: Sequence[Spread]) -> Figure:
 
 def _nameless(label: str) -> None:
     """No entry of the legend: another row has it."""
+
+
+def _wrapped(shown: Sequence[Spread]) -> int:
+    """Lines of names beyond one each."""
+    return sum(_row(one).count("\n") - 1 for one in shown)
 
 
 def _row(one: Spread) -> str:

@@ -78,6 +78,6 @@ def draw(shown: Sequence[Frontier]) -> Figure:
                 axes.set_title(plain(vehicle), fontsize=8)
         plain_numbers(panels[0].yaxis)
         plain_numbers(panels[-1].xaxis)
-        panels[-1].set_xlabel("simulated seconds of training")
+        panels[-1].set_xlabel("simulated time of the training data (s)")
         legend_below(figure, columns=1)
     return figure

@@ -66,6 +66,6 @@ def draw(shown: Sequence[ModeErrors]) -> Figure:
             plain_numbers(axes.yaxis)
             axes.set_ylabel(name)
         prediction.xaxis.set_major_locator(MaxNLocator(integer=True))
-        prediction.set_xlabel("real modes of one state")
+        prediction.set_xlabel("modes of a state (1)")
         legend_below(figure, columns=3)
     return figure

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from koopcli.config.settings import Plot
 from koopcli.errors import InvalidValueError
 from koopcli.figures.colours import COLOURS, GUIDE
-from koopcli.figures.drawing import Source, column
+from koopcli.figures.drawing import Source, column, with_error
 from koopcli.figures.style import COLUMN, legend_below, plain_numbers, style
 from koopcli.koopman.evaluation import Evaluation
 from koopcli.koopman.predictor import Predictor
@@ -35,10 +35,13 @@ class Trusted:
 
 
 def select(sources: Sequence[Source], settings: Plot) -> Trusted:
-    """What the figure shows. Raises ``InvalidValueError`` for a predictor without bounds."""
+    """What the figure shows. Raises ``InvalidValueError`` for a predictor without bounds, and where every
+    prediction diverged.
+    """
+    (shown,) = with_error(sources)
     evaluation: Evaluation = sources[0].records["evaluation"]
     predictor: Predictor = sources[0].records["predictor"]
-    shown = np.isfinite(evaluation.bound) & np.isfinite(evaluation.rmse)
+    shown &= np.isfinite(evaluation.bound)
     trust = getattr(predictor, "trust", None)
     if trust is None or not shown.any():
         raise InvalidValueError(

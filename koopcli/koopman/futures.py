@@ -20,7 +20,7 @@ GATHERED = 128  # states whose nodes' futures are then put together at once
 
 @dataclass(frozen=True)
 class Futures:
-    """ψ(x): the exponentials that fit the interpolated future of x best.
+    """ψ(x): the exponentials that fit the interpolated future of x best (7.16).
 
     ``trajectories`` (J, samples, n_x); ``nodes``: those of their samples that are looked up; ``frame``: in which what
     follows them is interpolated; ``projection`` (L, horizon + 1): from the samples of a future to the states of a

@@ -89,7 +89,7 @@ def _ablation(runs: Sequence[Run]) -> Table:
         found = [_first(run, blocks.ABLATION, label, v, seed) for run, v in columns]
         rows.append([label, *(_score(one.figures if one else None) for one in found)])
     title = "One ingredient taken away: RMSE in %, mean ± std (median)"
-    return Table(title, ["without", *(_column(run, v) for run, v in columns)], rows)
+    return Table(title, ["instead", *(_column(run, v) for run, v in columns)], rows)
 
 
 def _modes(runs: Sequence[Run]) -> Table:
@@ -181,7 +181,7 @@ def pictures(experiment: Experiment) -> list[Picture]:
         ladder = [task for _, task in of(blocks.LADDER, vehicle)]
         modes = [task for _, task in of(blocks.MODES, vehicle)]
         frontier += [ladder[0], ladder[blocks.STACKED], ladder[-1]]
-        frontier += [task for block in (blocks.BUDGETS, blocks.EDMD) for _, task in of(block, vehicle)]
+        frontier += [task for _, task in [*of(blocks.BUDGETS, vehicle), *of(blocks.EDMD, vehicle)[1:]]]
         about = f"Errors by initial state, {vehicle}: the paper's surface, lattice and nearest sample, and best-eigen."
         labels = {ladder[0]: "before", ladder[-1]: "after"}
         pictured += [
@@ -189,8 +189,7 @@ def pictures(experiment: Experiment) -> list[Picture]:
             Picture(draw("trust", [ladder[-1]]), f"Errors and the bounds given for them, {vehicle}, best-eigen."),
             Picture(draw("modes", modes), f"How many modes, {vehicle}."),
         ]
-        less = {task: f"without {cell.label}" for cell, task in of(blocks.ABLATION, vehicle)}
-        taken = {ladder[-1]: "best-eigen", **less}
+        taken = {ladder[-1]: "best-eigen", **{task: cell.label for cell, task in of(blocks.ABLATION, vehicle)}}
         about = f"One ingredient taken away at a time, {vehicle}."
         pictured.append(Picture(draw("compare", list(taken), labels=taken), about))
     return [Picture(draw("frontier", frontier), "Error against simulated seconds."), *pictured]

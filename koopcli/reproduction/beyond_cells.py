@@ -53,8 +53,6 @@ class Row:
     fit: FitEigen | FitEdmd
 
 
-PAPER = FitEigen(boundary="optimal", cut=CUT)
-COMB = replace(PAPER, eigenvalues="comb")
 AHEAD = FitEigen(window="horizon", eigenvalues="comb", cut=CUT, tabulate=TABLE, horizon=HORIZON)
 
 
@@ -83,11 +81,13 @@ def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
 def ladder(there: Experiment) -> Iterator[Row]:
     """From the paper's reading to the best predictor, an ingredient at a time."""
     gamma, shells = surface(there), f"{SHELLS} shells"
-    yield Row("lattice of rates, nearest sample", "surface", gamma, PAPER)
-    yield Row("lattice of rates, linear", "surface", gamma, replace(PAPER, lift="linear"))
-    yield Row("comb of rates, nearest sample", "surface", gamma, COMB)
-    yield Row(f"{_count('varpro')} best rates, nearest sample", "surface", gamma, replace(PAPER, eigenvalues="varpro"))
-    yield Row("comb of rates, linear", "surface", gamma, replace(COMB, lift="linear"))
+    paper = FitEigen(boundary="optimal", cut=CUT, tabulate=there.fit_eigen.tabulate)
+    comb = replace(paper, eigenvalues="comb")
+    yield Row("lattice of rates, nearest sample", "surface", gamma, paper)
+    yield Row("lattice of rates, linear", "surface", gamma, replace(paper, lift="linear"))
+    yield Row("comb of rates, nearest sample", "surface", gamma, comb)
+    yield Row(f"{_count('varpro')} best rates, nearest sample", "surface", gamma, replace(paper, eigenvalues="varpro"))
+    yield Row("comb of rates, linear", "surface", gamma, replace(comb, lift="linear"))
     stacked = replace(gamma, shells=SHELLS, steps=SHELL_STEPS)
     ahead = replace(AHEAD, tabulate=SHELL_TABLE, lift="linear")
     yield Row("comb, linear", f"{shells}, spiral", replace(stacked, mesh="fibonacci"), ahead)
@@ -131,22 +131,22 @@ def beside(there: Experiment) -> Iterator[Row]:
 
 
 def ablation(there: Experiment) -> Iterator[Row]:
-    """The best predictor with one ingredient less."""
+    """The best predictor with one ingredient less, named by what is there instead."""
     best, states = best_fit(there), greedy(there)
     known = round(best.tabulate / there.simulate.dt) - round((best.horizon or HORIZON) / there.simulate.dt)
     shorter = replace(best, rounds=0, tabulate=known * there.simulate.dt)
     less: list[tuple[str, SampleSettings, FitEigen]] = [
-        ("comb: the lattice of rates", states, replace(best, eigenvalues="dmd")),
-        ("splines: linear", states, replace(best, lift="linear", spacing=None)),
-        ("splines: moving least squares", states, replace(best, lift="mls", neighbours=None)),
-        ("splines: the nearest sample", states, replace(best, lift="nearest", spacing=None)),
-        ("world: state coordinates", states, replace(best, coordinates="state")),
-        ("distances: as they are", states, replace(best, radial_power=1.0)),
+        ("rates: lattice", states, replace(best, eigenvalues="dmd")),
+        ("lift: linear", states, replace(best, lift="linear", spacing=None)),
+        ("lift: moving least squares", states, replace(best, lift="mls", neighbours=None)),
+        ("lift: nearest sample", states, replace(best, lift="nearest", spacing=None)),
+        ("coordinates: state", states, replace(best, coordinates="state")),
+        ("distances: plain", states, replace(best, radial_power=1.0)),
         ("neighbours: any", states, replace(best, spacing=None)),
-        ("continuation: none", states, shorter),
-        ("images: none", greedy(there, plain=True), replace(best, mirror=())),
-        ("filling: as many states on Γ", _on_surface(there, states), best),
-        ("the horizon ahead: whole trajectories", states, _along(shorter)),
+        ("no continuation", states, shorter),
+        ("no images", greedy(there, plain=True), replace(best, mirror=())),
+        ("all starts on Γ", _on_surface(there, states), best),
+        ("window: trajectory", states, _along(shorter)),
     ]
     for label, sample, fit in less:
         yield Row(label, "surface" if isinstance(sample, EllipsoidSample) else "greedy", sample, fit)

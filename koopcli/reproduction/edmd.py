@@ -189,7 +189,16 @@ METHOD = Method(
         has_effect,
         plant="forces",
         swept=("orders", "draws", "draw_seeds", "training_forces", "full", "full_draws", "excitations"),
-        foreign=("fit-eigen", "baseline", "sample.box", "sample.point", "sample.ellipsoid", "sample.ball", "test.ball"),
+        foreign=(
+            "fit-eigen",
+            "baseline",
+            "sample.box",
+            "sample.point",
+            "sample.ellipsoid",
+            "sample.greedy",
+            "sample.ball",
+            "test.ball",
+        ),
     ),
     reads=("fit-edmd.centres", "fit-edmd.placement", "fit-edmd.seed"),
 )

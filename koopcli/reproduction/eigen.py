@@ -273,6 +273,7 @@ METHOD = Method(
             "sample.box",
             "sample.point",
             "sample.ball",
+            "sample.greedy",
             "test.box",
             "test.point",
         ),

@@ -144,7 +144,9 @@ def best_eigen(there: Experiment, budget: float | None = None) -> Experiment:
 
 def improved(experiment: Experiment) -> list[Task]:
     """The paper's reading with the best boundary values, and the best predictor."""
-    paper = replace(experiment, fit_eigen=FitEigen(boundary="optimal", cut=1e-10))
+    paper = replace(
+        experiment, fit_eigen=FitEigen(boundary="optimal", cut=1e-10, tabulate=experiment.fit_eigen.tabulate)
+    )
     return [fit_eigen(paper, simulation(paper, plant="slips")), fit_eigen(best_eigen(experiment))]
 
 

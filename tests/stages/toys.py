@@ -25,6 +25,7 @@ from koopcli.koopman.orthonormal import OrthonormalPolynomials
 from koopcli.koopman.polynomial import Polynomial
 from koopcli.koopman.predictor import Predictor
 from koopcli.koopman.tabulated import Tabulated
+from koopcli.koopman.trust import Trust
 from koopcli.progress import silent
 from koopcli.records import Sample, Trajectories
 from koopcli.stages.base import Context
@@ -101,7 +102,9 @@ def _looked_up() -> Predictor:
     C = 10 * np.cos(np.arange(18.0)).reshape(3, 6)
     states = 3 * np.sin(np.arange(45.0) ** 2).reshape(3, 5, 3)
     lift = Tabulated(states, nodes_of(states, states.shape[1], Search("nearest", np.ones(3))), starts, modes)
-    return Predictor(lift, modes, np.zeros((6, 4)), C, 0.01, _coverage(), STATES, INPUTS, 5, 6, 1e3, 1.0, horizon=8)
+    found = Predictor(lift, modes, np.zeros((6, 4)), C, 0.01, _coverage(), STATES, INPUTS, 5, 6, 1e3, 1.0, horizon=8)
+    trust = Trust(states.reshape(15, 3), 1 + np.arange(15.0), np.ones(3), 0.5, 1.5)
+    return replace(found, missed=0.7, trust=trust)
 
 
 def _calm() -> Trajectories:

@@ -78,7 +78,7 @@ class Linear:
 
 def _barycentric(corners: FloatArray, y: FloatArray) -> FloatArray:
     """Coordinates (n, n_x + 1) of ``y`` (n, n_x) in simplices (n, n_x + 1, n_x), by Cramer's rule: ratios of signed
-    volumes, which stay right for slivers. A simplex without volume counts as missed.
+    volumes (7.17), which stay right for slivers. A simplex without volume counts as missed.
     """
     edges = corners[:, :-1] - corners[:, -1:]
     place = y - corners[:, -1]

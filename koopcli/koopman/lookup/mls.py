@@ -29,7 +29,7 @@ class MovingLeastSquares:
 
 
 def trend_weights(near: FloatArray) -> FloatArray:
-    """The weights (n, q) of values at nodes ``near`` (n, q, n_x), for the value at zero of their linear trend.
+    """The weights (n, q) of values at nodes ``near`` (n, q, n_x), for the value at zero of their linear trend (7.18).
 
     Slopes are held a little, so that a direction in which the nodes do not differ has none.
     """

@@ -59,7 +59,7 @@ def _wild(weights: FloatArray) -> FloatArray:
 
 
 def spline_weights(near: FloatArray, degree: int, softness: float) -> FloatArray:
-    """The weights (n, q) of values at nodes ``near`` (n, q, n_x), for the value at zero, eq. (7.11).
+    """The weights (n, q) of values at nodes ``near`` (n, q, n_x), for the value at zero, eq. (7.19).
 
     Solves [Φ + softness P; Pᵀ 0] [w; ·] = [φ; p] with Φ = |y_i - y_j|³, P the monomials to ``degree`` one or two, φ and
     p those of zero.
