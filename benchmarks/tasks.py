@@ -134,8 +134,8 @@ def eigen_fit(store: Path):
 
 def eigen_dense(store: Path):
     """A tenth of the trajectories and splines as one dense least squares: a hundredth of the unknowns' cost."""
-    from koopcli.koopman.eigenfunctions import dmd_rates, lattice
     from koopcli.koopman.modes import exponentials
+    from koopcli.koopman.rates import dmd_rates, lattice
     from koopcli.koopman.thin_plate import draw_centres, thin_plate
 
     data = koopcli.load("simulate", store)
@@ -157,6 +157,69 @@ def eigen_evaluation(store: Path):
     yield evaluate(predictor, test, slice(None), 0).figures()["rmse"]["mean"]
 
 
+def _nodes_and_queries(store: Path):
+    """The samples of the first second of every trajectory, each once, and 2 000 test states, in semi-axes."""
+    data, test = koopcli.load("simulate", store), koopcli.load("simulate", store / "test")
+    x = np.asarray(data.x)
+    size = np.abs(x).max(axis=(0, 1))
+    nodes = np.unique(np.round(x[:, :101].reshape(-1, 3) / size, 9), axis=0)
+    return nodes, np.asarray(test.x)[:, 0] / size
+
+
+def _in_a_ball(store: Path):
+    """9 000 nodes in the volume, as the thinned samples of a greedy design lie, and the same test states."""
+    from koopcli.simulation.sampling import ball
+
+    return ball(0, 9000), 0.95 * _nodes_and_queries(store)[1]
+
+
+def _looked_up(kind: str, nodes, queries):
+    from koopcli.koopman.lookup import LOOKUPS
+    from koopcli.koopman.lookup.cloud import Cloud
+
+    numbers = np.arange(len(nodes))
+    found = LOOKUPS[kind].make(Cloud(nodes, numbers, numbers, LOOKUPS[kind].neighbours or 1))
+    found(queries[:1])
+    yield
+    indices, weights = found(queries)
+    yield float((weights[..., np.newaxis] * np.sin(nodes[indices])).sum())
+
+
+def walk(store: Path):
+    yield from _looked_up("linear", *_nodes_and_queries(store))
+
+
+def splines(store: Path):
+    yield from _looked_up("polyharmonic", *_in_a_ball(store))
+
+
+def find_simplex(store: Path):
+    """The same as `walk` by scipy's own search, which first prepares every simplex."""
+    from scipy.spatial import Delaunay, cKDTree
+
+    nodes, queries = _nodes_and_queries(store)
+    triangulation, tree = Delaunay(nodes), cKDTree(nodes)
+    yield
+    found = triangulation.find_simplex(queries)
+    T = triangulation.transform[found]
+    b = np.einsum("nij,nj->ni", T[:, :3], queries - T[:, 3])
+    weights = np.column_stack([b, 1 - b.sum(axis=1)])
+    indices = triangulation.simplices[found]
+    out = found < 0
+    indices[out], weights[out] = tree.query(queries[out])[1][:, np.newaxis], [1, 0, 0, 0]
+    yield float((weights[..., np.newaxis] * np.sin(nodes[indices])).sum())
+
+
+def rbf(store: Path):
+    """The same as `splines` by scipy's interpolator, a loop over the places."""
+    from scipy.interpolate import RBFInterpolator
+
+    nodes, queries = _in_a_ball(store)
+    yield
+    found = RBFInterpolator(nodes, np.sin(nodes), neighbors=60, kernel="cubic", degree=2)(queries)
+    yield float(found.sum())
+
+
 TASKS = {
     "fit-product": fit_product,
     "fit-blocks": fit_blocks,
@@ -170,6 +233,10 @@ TASKS = {
     "eigen-fit": eigen_fit,
     "eigen-dense": eigen_dense,
     "eigen-evaluation": eigen_evaluation,
+    "walk": walk,
+    "find-simplex": find_simplex,
+    "splines": splines,
+    "rbf": rbf,
 }
 
 

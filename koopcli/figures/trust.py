@@ -86,7 +86,7 @@ def draw(shown: Trusted) -> Figure:
         share.bar(np.arange(1, PARTS + 1), 100 * shown.by_part, width=0.6, color=COLOURS[5], zorder=2)
         share.axhline(100 * shown.level, color=GUIDE, linewidth=0.8, label=f"meant: {100 * shown.level:.0f} %")
         share.set_ylim(min(50.0, 100 * float(shown.by_part.min())), 100)
-        share.set_xlabel("fifth of the states, by rising bound")
+        share.set_xlabel("fifth of the states by rising bound (1)")
         share.set_ylabel("within (%)")
         legend_below(figure)
     return figure

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from koopcli.errors import InvalidValueError
 from koopcli.koopman.coverage import spread
 from koopcli.koopman.futures import Futures
 from koopcli.koopman.metrics import rmse
@@ -100,7 +101,10 @@ def held_back(
         rows = np.flatnonzero(of_group[j] == one)
         rest = nodes.only(np.flatnonzero(of_group[nodes.trajectory] != one))
         part = Futures(futures.trajectories, rest, futures.frame, futures.projection, futures.modes)
-        error[rows] = rmse(predict(part, x[rows]), truth[rows])
+        try:
+            error[rows] = rmse(predict(part, x[rows]), truth[rows])
+        except InvalidValueError as reason:
+            raise InvalidValueError(f"with trajectories held back for fit-eigen.trust, {reason}") from reason
     scored = np.isfinite(error)
     scale, power = nodes.search.scale, nodes.search.power
     return calibrated(x[scored], np.maximum(error[scored], SMALLEST), groups[j[scored]], scale, power)

@@ -115,7 +115,7 @@ def _best_row(there: Experiment) -> Row:
 def budgets(there: Experiment) -> Iterator[Row]:
     """The best predictor on other budgets, and on all of them without mirror images."""
     main, *others = there.reproduce.budgets
-    fit = best_fit(there)
+    fit = replace(best_fit(there), trust=False)
     alone = replace(fit, mirror=())
     yield Row("best-eigen without images", "greedy", greedy(there, main, plain=True), alone)
     for budget in others:
@@ -132,7 +132,7 @@ def beside(there: Experiment) -> Iterator[Row]:
 
 def ablation(there: Experiment) -> Iterator[Row]:
     """The best predictor with one ingredient less, named by what is there instead."""
-    best, states = best_fit(there), greedy(there)
+    best, states = replace(best_fit(there), trust=False), greedy(there)  # which moves no prediction
     known = round(best.tabulate / there.simulate.dt) - round((best.horizon or HORIZON) / there.simulate.dt)
     shorter = replace(best, rounds=0, tabulate=known * there.simulate.dt)
     less: list[tuple[str, SampleSettings, FitEigen]] = [

@@ -79,6 +79,7 @@ def _figures(predictor: Predictor) -> Meta:
         "modes": len(modes.rates),
         "missed": predictor.missed,
         "nodes": len(lift.nodes.kept),
+        "beyond": f"predictions from outside the hull of the data {predictor.beyond}",
         "trust": None if trust is None else {"level": trust.level, **summary(trust.errors)},
     }
 
