@@ -173,16 +173,25 @@ def _in_a_ball(store: Path):
     return ball(0, 9000), 0.95 * _nodes_and_queries(store)[1]
 
 
+def _futures(nodes):
+    """As many values at each node as a half second of three states has."""
+    return np.sin(nodes @ np.random.default_rng(0).standard_normal((3, 153)))
+
+
 def _looked_up(kind: str, nodes, queries):
+    from scipy.sparse import csr_matrix
+
     from koopcli.koopman.lookup import LOOKUPS
     from koopcli.koopman.lookup.cloud import Cloud
 
     numbers = np.arange(len(nodes))
     found = LOOKUPS[kind].make(Cloud(nodes, numbers, numbers, LOOKUPS[kind].neighbours or 1))
     found(queries[:1])
+    values = _futures(nodes)
     yield
     indices, weights = found(queries)
-    yield float((weights[..., np.newaxis] * np.sin(nodes[indices])).sum())
+    ends = np.arange(len(queries) + 1) * indices.shape[1]
+    yield float((csr_matrix((weights.ravel(), indices.ravel(), ends), shape=(len(queries), len(nodes))) @ values).sum())
 
 
 def walk(store: Path):
@@ -198,7 +207,7 @@ def find_simplex(store: Path):
     from scipy.spatial import Delaunay, cKDTree
 
     nodes, queries = _nodes_and_queries(store)
-    triangulation, tree = Delaunay(nodes), cKDTree(nodes)
+    triangulation, tree, values = Delaunay(nodes), cKDTree(nodes), _futures(nodes)
     yield
     found = triangulation.find_simplex(queries)
     T = triangulation.transform[found]
@@ -207,7 +216,7 @@ def find_simplex(store: Path):
     indices = triangulation.simplices[found]
     out = found < 0
     indices[out], weights[out] = tree.query(queries[out])[1][:, np.newaxis], [1, 0, 0, 0]
-    yield float((weights[..., np.newaxis] * np.sin(nodes[indices])).sum())
+    yield float((weights[..., np.newaxis] * values[indices]).sum())
 
 
 def rbf(store: Path):
@@ -215,8 +224,9 @@ def rbf(store: Path):
     from scipy.interpolate import RBFInterpolator
 
     nodes, queries = _in_a_ball(store)
+    values = _futures(nodes)
     yield
-    found = RBFInterpolator(nodes, np.sin(nodes), neighbors=60, kernel="cubic", degree=2)(queries)
+    found = RBFInterpolator(nodes, values, neighbors=60, kernel="cubic", degree=2)(queries)
     yield float(found.sum())
 
 

@@ -19,6 +19,7 @@ from koopcli.koopman.rates import RATES, Spectrum, Windows, check_growth
 from koopcli.koopman.tabulated import Tabulated
 from koopcli.koopman.thin_plate import draw_centres, thin_plate
 from koopcli.koopman.trust import held_back
+from koopcli.progress import Progress, silent
 from koopcli.records import FloatArray, Trajectories
 
 
@@ -53,7 +54,7 @@ class Reading:
     trust: bool
 
 
-def fit(trajectories: Trajectories, reading: Reading, images: int = 1) -> Predictor:
+def fit(trajectories: Trajectories, reading: Reading, images: int = 1, progress: Progress = silent) -> Predictor:
     """The predictor whose lifted states are eigenfunctions, known at samples and looked up elsewhere (7.1).
 
     The trajectories are ``images`` times as many as were observed, mirror images after one another. Raises
@@ -67,11 +68,12 @@ def fit(trajectories: Trajectories, reading: Reading, images: int = 1) -> Predic
     rates = RATES[reading.spectrum.kind](x, _windows(x, length), dt, reading.spectrum)
     check_growth(rates, length * dt)
     modes = Modes(rates, newton_couplings(rates, length * dt), 1, dt)
-    make = _ahead if reading.window == "horizon" else _along
-    return make(trajectories, x, reading, modes, images)
+    if reading.window == "horizon":
+        return _ahead(trajectories, x, reading, modes, images, progress)
+    return _along(trajectories, x, reading, modes)
 
 
-def _along(trajectories: Trajectories, x: FloatArray, reading: Reading, modes: Modes, images: int) -> Predictor:
+def _along(trajectories: Trajectories, x: FloatArray, reading: Reading, modes: Modes) -> Predictor:
     """Eigenfunctions from Γ: what the initial states have is carried along each trajectory."""
     cut = _cut(reading, x.shape[1])
     if reading.boundary == "thin-plate":
@@ -89,7 +91,9 @@ def _along(trajectories: Trajectories, x: FloatArray, reading: Reading, modes: M
     return _predictor(trajectories, reading, lift, solution.C, rank, directions, solution.condition, solution.missed)
 
 
-def _ahead(trajectories: Trajectories, x: FloatArray, reading: Reading, modes: Modes, images: int) -> Predictor:
+def _ahead(
+    trajectories: Trajectories, x: FloatArray, reading: Reading, modes: Modes, images: int, progress: Progress
+) -> Predictor:
     """Lifted states fitted to what follows within the horizon."""
     check_frame(reading.frame, trajectories.state_channels)
     horizon, n_x = reading.horizon, x.shape[2]
@@ -117,7 +121,7 @@ def _ahead(trajectories: Trajectories, x: FloatArray, reading: Reading, modes: M
     def predict(part: Futures, x0: FloatArray) -> FloatArray:
         return replace(found, observables=part).predict(x0, steps=horizon)
 
-    return replace(found, trust=held_back(lift, known, groups, predict))
+    return replace(found, trust=held_back(lift, known, groups, predict, progress))
 
 
 def _predictor(

@@ -15,6 +15,7 @@ from koopcli.koopman.futures import Futures
 from koopcli.koopman.metrics import rmse
 from koopcli.koopman.modes import IndexArray
 from koopcli.koopman.nodes import Search
+from koopcli.progress import Progress, silent
 from koopcli.records import Array, FloatArray, Meta, Packed
 
 LEVEL = 0.9
@@ -78,7 +79,11 @@ class Trust:
 
 
 def held_back(
-    futures: Futures, known: int, groups: IndexArray, predict: Callable[[Futures, FloatArray], FloatArray]
+    futures: Futures,
+    known: int,
+    groups: IndexArray,
+    predict: Callable[[Futures, FloatArray], FloatArray],
+    progress: Progress = silent,
 ) -> Trust:
     """The estimate for ``futures``, from predicting some of its samples without the trajectories of their group.
 
@@ -97,7 +102,9 @@ def held_back(
     fold = np.random.default_rng(0).permutation(len(members)) % min(FOLDS, len(members))
     of_group = fold[np.searchsorted(members, groups)]
     error = np.empty(len(x))
-    for one in np.unique(fold):
+    folds = np.unique(fold)
+    for done, one in enumerate(folds):
+        progress(done, len(folds))
         rows = np.flatnonzero(of_group[j] == one)
         rest = nodes.only(np.flatnonzero(of_group[nodes.trajectory] != one))
         part = Futures(futures.trajectories, rest, futures.frame, futures.projection, futures.modes)

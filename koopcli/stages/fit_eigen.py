@@ -38,7 +38,8 @@ def _run(settings: FitEigen, inputs: Inputs, context: Context) -> Predictor:
     trajectories = replace(trajectories, x=x)  # not read again
     signs = images(settings.mirror, remembered_plant(trajectories.plant).parameters) if settings.mirror else []
     complete = eigenfunctions.with_images(trajectories, signs)
-    return eigenfunctions.fit(complete, reading(settings, trajectories.steps, trajectories.dt), 1 + len(signs))
+    how = reading(settings, trajectories.steps, trajectories.dt)
+    return eigenfunctions.fit(complete, how, 1 + len(signs), context.progress)
 
 
 def reading(settings: FitEigen, steps: int, dt: float) -> Reading:

@@ -63,7 +63,9 @@ def settings_of(task: Task) -> Iterator[tuple[str, Any]]:
 def _beside(evaluation: Task, moved: Sequence[str]) -> dict[str, Any]:
     """Every setting that two points of one curve have in common."""
     found = {
-        name: value for name, value in settings_of(evaluation.input("predictor")) if not name.startswith(tuple(moved))
+        name: value
+        for name, value in settings_of(evaluation.input("predictor"))
+        if not name.startswith((*moved, *UNTOLD))
     }
     found |= {f"test/{name}": value for name, value in settings_of(evaluation.input("trajectories"))}
     return found | {"first": evaluation.settings.first, "restart": evaluation.settings.restart}
@@ -103,6 +105,8 @@ def _seconds(evaluation: Task, experiment: Experiment) -> Series:
         about = ", ".join([sample.kind, *parts, *(f"{mirror} images" for mirror in fit.mirror)])
     return Series(f"{vehicle}{about}", sample.trajectories * steps.steps * steps.dt)
 
+
+UNTOLD = ("fit-eigen.trust",)  # what moves no prediction tells no two curves apart
 
 AXES: dict[str, tuple[Callable[[Task, Experiment], Series], tuple[str, ...]]] = {
     "order": (_order, ("fit-edmd.order",)),
