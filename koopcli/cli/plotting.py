@@ -19,6 +19,7 @@ from koopcli.errors import InvalidValueError, StorageError, UnknownNameError, Us
 
 if TYPE_CHECKING:
     from koopcli.figures.registry import FigureKind
+    from koopcli.stages.base import Task
     from koopcli.stages.pipeline import Artefact
 
 
@@ -34,6 +35,10 @@ def plot(
     ] = None,
     csv_: Annotated[
         Path | None, typer.Option("--csv", metavar="FILE", help="Write the numbers that are drawn, as a table.")
+    ] = None,
+    label: Annotated[
+        list[str] | None,
+        typer.Option(metavar="TEXT", help="What an artefact is called beside others: one for each, in their order."),
     ] = None,
     list_: Annotated[bool, typer.Option("--list", help="List the figures.")] = False,
     set_: SetOption = None,
@@ -74,6 +79,7 @@ def plot(
             if f"{name}.".startswith(made.fixed):
                 raise UsageError(f"--set {name} changes nothing in the figure '{figure}': {made.instead}")
         sources = made.tasks(call.experiment)
+    labels = _labels(label, sources, kind)
 
     def export(artefact: Artefact) -> None:
         if output is not None:
@@ -87,9 +93,20 @@ def plot(
         if output is None and csv_ is None and not as_json:
             call.console.note("add -o FILE.png, .svg or .pdf to write the image, --csv FILE for its numbers")
 
-    task = drawn.figure(figure, sources, image, call.experiment, call.simulated)
+    task = drawn.figure(figure, sources, image, call.experiment, call.simulated, labels)
     told_by = [f"plot.{name}" for name in kind.told]
     call.run(task, as_json=as_json, dry_run=dry_run, extra=export, reads=(*made.reads, *told_by))
+
+
+def _labels(given: list[str] | None, sources: list[Task], kind: FigureKind) -> dict[Task, str] | None:
+    """What every artefact is called, if that was told."""
+    if not given:
+        return None
+    if kind.draws != "beside":
+        raise UsageError("--label changes nothing here: it names artefacts that a figure sets beside one another")
+    if len(given) != len(sources):
+        raise UsageError(f"--label is given {len(given)} times for {len(sources)} artefacts: give one for each")
+    return dict(zip(sources, given, strict=True))
 
 
 def _format(output: Path | None) -> ImageFormat:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from koopcli.config.settings import Plot
 from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import Source, column, with_error
-from koopcli.figures.style import COLUMN, LINE, plain_numbers, style
+from koopcli.figures.style import COLUMN, LINE, plain, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray
 
 WIDEST = 34  # letters of a name in a line
@@ -99,7 +99,7 @@ def _wrapped(shown: Sequence[Spread]) -> int:
 
 
 def _row(one: Spread) -> str:
-    name = fill(one.label, WIDEST)
+    name = fill(plain(one.label), WIDEST)
     if not np.isfinite(one.mean):
         return f"{name}\nall diverged"
     lost = f", {one.diverged} diverged" if one.diverged else ""

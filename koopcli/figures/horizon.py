@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from koopcli.config.settings import Plot
 from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import LOST, Source, column, with_error
-from koopcli.figures.style import COLUMN, legend_below, looks, plain_numbers, style
+from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray, Trajectories
 
 QUANTILES = {"lower": 0.1, "median": 0.5, "upper": 0.9}
@@ -84,7 +84,7 @@ def draw(shown: Sequence[ErrorOverTime]) -> Figure:
                 )
             median = _seen(one.median)
             alone = np.isfinite(median).sum() == 1  # a line of one point is none
-            axes.plot(one.time, median, marker="o" if alone else "", label=one.label or "median", **look)
+            axes.plot(one.time, median, marker="o" if alone else "", label=plain(one.label) or "median", **look)
         axes.set_yscale("log")
         plain_numbers(axes.yaxis)
         axes.set_xlabel("time (s)")

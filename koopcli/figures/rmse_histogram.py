@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from koopcli.config.settings import Plot
 from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import LOST, Source, column, with_error
-from koopcli.figures.style import COLUMN, legend_below, looks, plain_numbers, style
+from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
 from koopcli.records import Array, FloatArray
 
 BINS = 40
@@ -72,7 +72,7 @@ def draw(shown: Sequence[Histogram]) -> Figure:
                 axes.axvline(one.median, color=COLOURS[1], linestyle="--", label=f"median {one.median:.4g} %")
             else:
                 median = f" (median {one.median:.3g} %)" if np.isfinite(one.median) else ""
-                axes.stairs(one.share, one.edges, label=one.label + median, linewidth=1.2, **look)
+                axes.stairs(one.share, one.edges, label=plain(one.label) + median, linewidth=1.2, **look)
         axes.set_xscale("log")
         plain_numbers(axes.xaxis)
         axes.set_xlabel("RMSE (%)")

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 from koopcli.config.changes import flat, parse_set
 from koopcli.errors import InvalidValueError, UsageError
 from koopcli.figures.drawing import Drawing
-from koopcli.figures.registry import FIGURES
+from koopcli.figures.registry import FIGURES, FigureKind
 from koopcli.reproduction.report import Method, Picture, Run
 from koopcli.stages import drawn
 from koopcli.stages.base import Task
 from koopcli.stages.effects import why_idle
+from koopcli.stages.naming import names
 from koopcli.stages.pipeline import Pipeline
 from koopcli.store import Record
 
@@ -82,6 +83,7 @@ def command(run: Run, picture: Picture, draws: Sequence[Record]) -> str:
     if alone != task:
         words += [record.name for record in draws]
         told = [one for one in told if kind.takes == "predictor" and one.startswith(drawn.TOLD_BESIDE)]
+        words += _labels(task, kind)
     if run.base != "paper" and (alone == task or kind.takes == "predictor"):
         words += ["--experiment", run.base]
     reads = (*made.reads, *(f"plot.{field}" for field in kind.told))
@@ -90,6 +92,17 @@ def command(run: Run, picture: Picture, draws: Sequence[Record]) -> str:
         if why_idle(setting, run.experiment, [task], reads) is None:
             words += ["--set", one]
     return shlex.join([*words, "-o", f"{name}.{task.settings.format}"])
+
+
+def _labels(task: Task, kind: FigureKind) -> Iterator[str]:
+    """What artefacts are called, where that is not what they would be called by their settings."""
+    if kind.draws != "beside":
+        return
+    evaluations = {role: one for role, one in task.inputs if role.endswith("/evaluation")}
+    ordered = [evaluations[f"{i}/evaluation"] for i in range(len(evaluations))]
+    labels = [one.label for one in task.settings.series]
+    if labels != names([one.input("predictor") for one in ordered]):
+        yield from (word for label in labels for word in ("--label", label))
 
 
 def provenance(one: Illustration) -> Iterator[tuple[str, str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 
 import numpy as np
 import pytest
@@ -181,3 +182,22 @@ def test_the_figures_alone(koop, folder, figure):
     assert result.code == 0, result.err
     assert (folder / f"{figure}.png").stat().st_size > 10_000
     assert len((folder / f"{figure}.csv").read_text().splitlines()) > 2
+
+
+def test_labels_of_ones_own(koop, folder):
+    data = koop("simulate", "--plant", "slips").name
+    both = [koop("evaluate", koop("fit-eigen", data, *more).name).name for more in ((), ("--lift", "linear"))]
+    drawn = koop("plot", "compare", *both, "--label", "one $x$", "--label", "_other", "--csv", "c.csv")
+    assert drawn.code == 0, drawn.err
+    assert "one $x$/mean (%)" in (folder / "c.csv").read_text()
+    one_line(koop("plot", "compare", *both, "--label", "one"), 2, "--label is given 1 times for 2 artefacts")
+    one_line(koop("plot", "error-map", both[0], "--label", "one"), 2, "--label changes nothing here")
+
+
+def test_the_commands_of_the_report_draw_its_pictures(koop):
+    """Whatever a picture calls its artefacts, the command under it does too."""
+    found = json.loads(koop("reproduce", "eigen", "--beyond", "--json").out)
+    for one in found["figures"]:
+        if one["method"] == "beyond" and one["figure"] in ("before-after", "compare", "trust"):
+            words = shlex.split(one["command"])[1:]
+            assert koop(*words, tiny=False).name == one["name"], one["command"]
