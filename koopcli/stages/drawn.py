@@ -70,6 +70,7 @@ MADE: dict[str, Made] = {
     ),
     "trusted": Made(
         lambda experiment: [recipes.evaluation(experiment, recipes.improved(experiment)[-1])],
+        reads=("reproduce.budgets",),
         fixed=("fit-eigen.", "sample."),
         instead="it draws the experiment best-eigen; name an evaluation to choose another",
     ),
