@@ -113,7 +113,7 @@ def _table(table: Table) -> str:
         f'<tr><th scope="row">{_indented(row[0])}</th>{"".join(f"<td>{_text(cell)}</td>" for cell in row[1:])}</tr>'
         for row in table.rows
     )
-    kind = ' class="words"' if table.words else ""
+    kind = ' class="words"' if table.words else f' class="left-{table.left}"' if table.left > 1 else ""
     return (
         f'<h4>{_text(table.title)}</h4><div class="wide"><table{kind}><thead><tr>{head}</tr></thead>'
         f"<tbody>{rows}</tbody></table></div>"

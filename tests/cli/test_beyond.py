@@ -165,7 +165,7 @@ def test_beyond_in_one_command(koop, folder):
     assert len(ladder) == 14
     assert ladder[-1]["rmse"]["mean"] < ladder[0]["rmse"]["mean"] / 2
     assert ladder[-1]["simulated"] == pytest.approx(30)
-    assert all(cell["query"] > 0 and cell["fit"] > 0 for cell in ladder)
+    assert all(cell["query"] > 0 and cell["build"] > 0 for cell in ladder)
     drawn = [one["figure"] for one in found["figures"] if one["method"] == "beyond"]
     assert drawn == ["frontier", *(["before-after", "trust", "modes", "compare"] * 2)]
     assert all(one["name"] for one in found["figures"])
