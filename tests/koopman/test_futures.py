@@ -132,6 +132,18 @@ def test_a_state_that_is_not_finite_has_no_prediction(rolling):
     assert np.isnan(predictor.bound(x)).tolist() == [True, False]
 
 
+def test_states_that_are_counted_as_outside_are_those_that_fall_back(rolling):
+    """The hull that evaluations report is that of the nodes; beyond it `linear` takes the nearest of them."""
+    data, test = rolling
+    predictor = eigen_fit(data, **AHEAD, lift="linear", tabulated=50, nodes=6)
+    x0 = np.asarray(test.x)[:, 0]
+    _, weights = predictor.observables.nodes.find(x0)
+    fallen = (weights == [1, 0, 0, 0]).all(axis=1)
+    assert 5 < fallen.sum() < 295
+    assert (fallen == predictor.coverage.outside(x0)).all()
+    assert predictor.beyond == "take the nearest sample"
+
+
 # --- more from the same data
 
 
