@@ -12,6 +12,7 @@ from koopcli.config.experiment import Experiment
 from koopcli.config.samples import BallSample, EllipsoidSample
 from koopcli.records import Meta
 from koopcli.reproduction import beyond_cells as blocks
+from koopcli.reproduction.eigen import FOREIGN
 from koopcli.reproduction.eigen_cells import ball, surface
 from koopcli.reproduction.report import (
     REDUCED,
@@ -271,19 +272,7 @@ METHOD = Method(
         has_effect,
         plant="slips",
         swept=("seeds", "beside", "unseen", "pairs", "budgets"),
-        foreign=(
-            "fit-edmd",
-            "fit-eigen",
-            "baseline",
-            "plot",
-            "sample.grid",
-            "sample.box",
-            "sample.point",
-            "sample.ball",
-            "sample.greedy",
-            "test.box",
-            "test.point",
-        ),
+        foreign=(*FOREIGN, "fit-eigen"),
     ),
     measure=measure,
 )

@@ -8,7 +8,7 @@ from itertools import product
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.samples import EllipsoidSample, GreedySample, SampleSettings
-from koopcli.config.settings import PAIRS, Eigenvalues, FitEdmd, FitEigen
+from koopcli.config.settings import PAIRS, FitEdmd, FitEigen
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.rates import lattice_size
 from koopcli.reproduction.eigen_cells import CUT, surface
@@ -164,14 +164,11 @@ def _on_surface(there: Experiment, like: GreedySample) -> EllipsoidSample:
 
 def sweep(there: Experiment) -> Iterator[tuple[int, Row]]:
     """How many rates of which kind, everything else as in the best predictor but for what takes long."""
-    best = replace(best_fit(there), rounds=0, tabulate=TABLE, trust=False, spacing=None, nodes=THINNED)
+    best = replace(best_fit(there), rounds=0, tabulate=TABLE, trust=False, spacing=None, nodes=THINNED, pairs=None)
     states = greedy(there)
-    for degree in recipes.DEGREES:
-        fit = replace(best, eigenvalues="dmd", degree=degree)
-        yield lattice_size(STATES, degree), Row("dmd", "greedy, images", states, fit)
-    kinds: tuple[Eigenvalues, ...] = ("comb", "varpro")
-    for kind, pairs in product(kinds, there.reproduce.pairs):
-        yield 2 * pairs + 2, Row(kind, "greedy, images", states, replace(best, eigenvalues=kind, pairs=pairs))
+    for fit in recipes.mode_fits(best, there.reproduce.pairs):
+        modes = lattice_size(STATES, fit.degree) if fit.pairs is None else 2 * fit.pairs + 2
+        yield modes, Row(fit.eigenvalues, "greedy, images", states, fit)
 
 
 def unseen(experiment: Experiment) -> list[tuple[str, Experiment]]:

@@ -250,6 +250,19 @@ def _about(fit: FitEigen) -> str:
     return f"{fit.boundary}{splines}{cut_text(settled.cut)}, sums of up to {fit.degree} rates"
 
 
+FOREIGN = (
+    "fit-edmd",
+    "baseline",
+    "plot",
+    "sample.grid",
+    "sample.box",
+    "sample.point",
+    "sample.ball",
+    "sample.greedy",
+    "test.box",
+    "test.point",
+)  # what belongs to the other method, or to no cell of this one
+
 METHOD = Method(
     name="eigen",
     title="eigenfunctions",
@@ -265,17 +278,6 @@ METHOD = Method(
         has_effect,
         plant="slips",
         swept=("seeds", "cuts", "mu_scales", "beside"),
-        foreign=(
-            "fit-edmd",
-            "baseline",
-            "plot",
-            "sample.grid",
-            "sample.box",
-            "sample.point",
-            "sample.ball",
-            "sample.greedy",
-            "test.box",
-            "test.point",
-        ),
+        foreign=FOREIGN,
     ),
 )

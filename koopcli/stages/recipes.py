@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args
@@ -121,17 +121,22 @@ def draw_sweep(experiment: Experiment) -> list[Task]:
 DEGREES = (1, 2, 3)  # of the lattice, where modes are swept
 
 
+def mode_fits(fit: FitEigen, pairs: Sequence[int]) -> list[FitEigen]:
+    """The fit with every number of rates of every kind: the lattice by its degree, the others by their ``pairs``."""
+    kinds: tuple[Eigenvalues, ...] = ("comb", "varpro")
+    return [
+        *(replace(fit, eigenvalues="dmd", degree=degree) for degree in DEGREES),
+        *(replace(fit, eigenvalues=kind, pairs=count) for kind in kinds for count in pairs),
+    ]
+
+
 def mode_sweep(experiment: Experiment) -> list[Task]:
     """One evaluation for each number of rates, of every kind; the best boundary values unless windows are fitted."""
-    fits = [replace(experiment.fit_eigen, eigenvalues="dmd", degree=degree) for degree in DEGREES]
-    kinds: tuple[Eigenvalues, ...] = ("comb", "varpro")
-    fits += [
-        replace(experiment.fit_eigen, eigenvalues=kind, pairs=pairs)
-        for kind in kinds
-        for pairs in experiment.reproduce.pairs
-    ]
-    fits = [fit if fit.window == "horizon" else replace(fit, boundary="optimal") for fit in fits]
-    return [evaluation(experiment, fit_eigen(replace(experiment, fit_eigen=fit))) for fit in fits]
+    fit = experiment.fit_eigen
+    if fit.window != "horizon":
+        fit = replace(fit, boundary="optimal")
+    fits = mode_fits(fit, experiment.reproduce.pairs)
+    return [evaluation(experiment, fit_eigen(replace(experiment, fit_eigen=one))) for one in fits]
 
 
 def best_eigen(there: Experiment, budget: float | None = None) -> Experiment:
