@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from koopcli.koopman.modes import Modes, exponentials
-from koopcli.records import FloatArray
+from koopcli.records import BoolArray, FloatArray
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,10 @@ class Time:
     singular: FloatArray
     driven: FloatArray
     seen: FloatArray
+
+    def kept(self, cut: float) -> BoolArray:
+        """Which directions are not below ``cut`` times the largest, (L,)."""
+        return np.asarray(self.singular > cut * self.singular[0])
 
 
 def time_part(modes: Modes, samples: int) -> Time:
@@ -86,7 +90,7 @@ def fit_free(x: FloatArray, modes: Modes, cut: float) -> Solution:
     of each block. ``modes`` has one copy here.
     """
     time = time_part(modes, x.shape[1])
-    keep = time.singular > cut * time.singular[0]
+    keep = time.kept(cut)
     held = np.tensordot(x, time.left[:, keep], axes=(1, 0))  # (J, n_x, kept)
     n_x, L = x.shape[2], len(modes.rates)
     return Solution(
@@ -108,7 +112,7 @@ def read_off(states: int, rates: int) -> FloatArray:
 
 def projection(time: Time, cut: float) -> FloatArray:
     """From the samples of a window to the states of a block that hold it best, (L, samples), as in :func:`fit_free`."""
-    keep = time.singular > cut * time.singular[0]
+    keep = time.kept(cut)
     return np.asarray(time.seen[:, keep] @ time.left[:, keep].T)
 
 
@@ -117,7 +121,7 @@ def missed_ahead(x: FloatArray, time: Time, cut: float) -> float:
 
     Every window that lies within the trajectories counts once.
     """
-    left = time.left[:, time.singular > cut * time.singular[0]]
+    left = time.left[:, time.kept(cut)]
     size = held = 0.0
     for k in range(x.shape[1] - len(left) + 1):
         window = x[:, k : k + len(left)]

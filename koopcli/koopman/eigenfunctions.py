@@ -111,7 +111,7 @@ def _ahead(
         ahead = lift.future(x[:, -1])[:, 1 : reading.tabulated - known + 1]
         lift = futures(np.concatenate([x, ahead], axis=1), reading.tabulated + 1)
     C = boundary.read_off(n_x, len(modes.rates))
-    rank = int((time.singular > cut * time.singular[0]).sum())
+    rank = int(time.kept(cut).sum())
     condition, missed = boundary.condition_of(time.singular), boundary.missed_ahead(x, time, cut)
     found = _predictor(trajectories, reading, lift, C, rank, len(modes.rates), condition, missed)
     if not reading.trust:

@@ -10,6 +10,7 @@ import numpy as np
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.samples import BallSample, EllipsoidSample
+from koopcli.koopman.trust import LEVEL
 from koopcli.records import Meta
 from koopcli.reproduction import beyond_cells as blocks
 from koopcli.reproduction.eigen import FOREIGN
@@ -30,7 +31,6 @@ from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline
 
 TENFOLD = 10.0  # how much worse EDMD on the same data is expected to be
-COVERED = 0.9
 
 NOTES = (
     "A comb of rates needs no data: 22 exponentials hold half a second of any of these cars, where the lattice of "
@@ -136,7 +136,7 @@ def _trust(runs: Sequence[Run]) -> Table:
                     covered = f"{100 * bound['covered']:.1f} %"
                     rows.append([_column(run, vehicle), str(seed), covered, f"{bound['median']:.3g} %"])
     header = ["vehicle", "seed", "errors within their bounds", "median bound"]
-    return Table(f"Trust: {100 * COVERED:.0f} % bounds on the error from each test state, best-eigen", header, rows)
+    return Table(f"Trust: {100 * LEVEL:.0f} % bounds on the error from each test state, best-eigen", header, rows)
 
 
 def notes(runs: Sequence[Run]) -> list[str]:

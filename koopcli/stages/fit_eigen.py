@@ -49,7 +49,7 @@ def reading(settings: FitEigen, steps: int, dt: float) -> Reading:
     horizon = steps - tabulated if s.horizon is None else _whole("horizon", s.horizon, dt)
     assert s.pairs is not None or s.eigenvalues == "dmd", "settled"
     return Reading(
-        spectrum=Spectrum(s.eigenvalues, s.degree, s.pairs or 0, s.lowest, s.highest, s.damping),
+        spectrum=_spectrum(s),
         window=s.window,
         boundary=s.boundary,
         centres=s.centres,
@@ -67,6 +67,10 @@ def reading(settings: FitEigen, steps: int, dt: float) -> Reading:
         rounds=s.rounds,
         trust=s.trust,
     )
+
+
+def _spectrum(s: FitEigen) -> Spectrum:
+    return Spectrum(s.eigenvalues, s.degree, s.pairs or 0, s.lowest, s.highest, s.damping)
 
 
 def _figures(predictor: Predictor) -> Meta:
@@ -170,12 +174,11 @@ def _prospect(task: Task) -> Prospect:
         starts = sample.settings.trajectories if sample is not None else task.settings.centres
         copies = min(starts, task.settings.centres)
     horizon = None
-    spectrum = Spectrum(fit.eigenvalues, fit.degree, fit.pairs or 0, fit.lowest, fit.highest, fit.damping)
     if simulation is not None:
         found = reading(fit, simulation.settings.steps, simulation.settings.dt)
         eigenfunctions.check_window(simulation.settings.steps, found, simulation.settings.dt)
         horizon = found.horizon
-    return Prospect(copies * spectrum.count(n_x), horizon, about)
+    return Prospect(copies * _spectrum(fit).count(n_x), horizon, about)
 
 
 def _estimate(task: Task) -> Cost:

@@ -55,6 +55,11 @@ def test_option_names_are_the_registries(literal, registry):
     assert set(get_args(literal)) == set(registry)
 
 
+def test_defaults_said_twice_agree():
+    """Settings are known without the numerics, which have the same numbers for whoever calls them."""
+    assert {k: kind.neighbours for k, kind in LOOKUPS.items() if kind.neighbours is not None} == settings.NEIGHBOURS
+
+
 def test_the_paper_file_writes_out_every_default():
     """`paper.toml` and the defaults in the code are one thing said twice; neither may drift."""
     loaded = load_experiment("paper", {})
