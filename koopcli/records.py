@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,6 +14,7 @@ from koopcli.errors import InvalidValueError
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.int64]
 Meta = dict[str, Any]  # what JSON can hold
 
 
@@ -154,11 +155,50 @@ class Sample:
 
 
 @dataclass(frozen=True)
+class Course:
+    """How the integration of n trajectories went.
+
+    ``steps`` (n,): the last sample that each has a state at; ``reason`` (n,): why it ended there, a place in ``ENDS``,
+    zero for one that ran its whole length; ``substeps`` (n,): the most integration steps that any of its samples took,
+    zero where a solver chose them itself.
+    """
+
+    steps: IntArray
+    reason: IntArray
+    substeps: IntArray
+
+    @property
+    def finished(self) -> BoolArray:
+        """Which ran their whole length, (n,)."""
+        return np.asarray(self.reason == 0)
+
+    def pack(self) -> dict[str, Array]:
+        """The arrays for storage."""
+        found = {f.name: Array(getattr(self, f.name), ("trajectory",), "1") for f in fields(self)}
+        return {f"course/{name}": array for name, array in found.items()}
+
+    @classmethod
+    def unpack(cls, arrays: Mapping[str, Array]) -> Course | None:
+        """The inverse of :meth:`pack`; None where there is none."""
+        found = {name.partition("/")[2]: a.values[...] for name, a in arrays.items() if name.startswith("course/")}
+        return cls(**found) if found else None
+
+
+ENDS = (
+    "ran its whole length",
+    "left the numbers that mean anything",
+    "needed too many integration steps for one sample",
+    "stopped its solver",
+)  # why trajectories end
+
+
+@dataclass(frozen=True)
 class Trajectories:
     """Sampled trajectories: ``x`` (n, steps+1, n_x), ``u`` (n, steps, n_u) with u_k acting from k to k+1, ``dt`` in s.
 
     ``product = (states, input rows)`` says that the trajectories are every state with every input row, state-major.
-    ``plant`` tells how they were made, as JSON. The arrays may live on disk; they are read in blocks.
+    ``plant`` tells how they were made, as JSON, and ``course`` how it went; a trajectory that ended early is not a
+    number from there on, and :meth:`finished` leaves it out. The arrays may live on disk; they are read in blocks.
     """
 
     x: Blocks
@@ -168,6 +208,7 @@ class Trajectories:
     input_channels: Channels
     product: tuple[int, int] | None = None
     plant: Meta = field(default_factory=dict)
+    course: Course | None = None
 
     def __post_init__(self) -> None:
         n, samples, n_x = self.x.shape
@@ -183,6 +224,14 @@ class Trajectories:
     def steps(self) -> int:
         """Steps of each trajectory."""
         return self.x.shape[1] - 1
+
+    def finished(self) -> Trajectories:
+        """Those that ran their whole length; the product structure is lost with any that did not."""
+        if self.course is None or self.course.finished.all():
+            return self
+        kept = self.course.finished
+        course = Course(*(getattr(self.course, f.name)[kept] for f in fields(Course)))
+        return replace(self, x=self.x[:][kept], u=self.u[:][kept], product=None, course=course)
 
     @property
     def factors(self) -> tuple[int, int] | None:
@@ -204,6 +253,7 @@ class Trajectories:
         arrays = {
             "x": Array(self.x, ("trajectory", "sample", "state"), self.state_channels.unit_text),
             "u": Array(self.u, ("trajectory", "step", "input"), self.input_channels.unit_text),
+            **(self.course.pack() if self.course is not None else {}),
         }
         meta = {
             "dt": self.dt,
@@ -226,4 +276,5 @@ class Trajectories:
             input_channels=Channels.unpack(packed.meta["input_channels"]),
             product=(product[0], product[1]) if product else None,
             plant=packed.meta["plant"],
+            course=Course.unpack(packed.arrays),
         )

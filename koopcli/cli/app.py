@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import koopcli
-from koopcli.cli import looking, making, plotting, reproduce
+from koopcli.cli import looking, making, plotting, reproduce, vehicles
 
 app = typer.Typer(
     name="koop",
@@ -23,6 +23,7 @@ reproduce.register(app)
 making.register(app)
 plotting.register(app)
 looking.register(app)
+vehicles.register(app)
 
 
 def _version(wanted: bool) -> None:

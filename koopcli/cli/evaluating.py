@@ -20,7 +20,9 @@ from koopcli.cli.options import (
     names,
 )
 from koopcli.config.changes import Changes, Values
-from koopcli.config.samples import BallSample, BoxSample, Excitation
+from koopcli.config.driving import DriveSample
+from koopcli.config.sampled import Excitation
+from koopcli.config.samples import BallSample, BoxSample
 from koopcli.console import Console, show_table
 
 if TYPE_CHECKING:
@@ -42,19 +44,27 @@ def evaluate(
     ] = None,
     excitation: Annotated[
         Excitation | None,
-        typer.Option(metavar=names(Excitation), help=f"forces: inputs of the test set ({BoxSample.excitation})."),
+        typer.Option(
+            metavar=names(Excitation),
+            help=f"Inputs of the test set (forces: {BoxSample.excitation}, wheels: {DriveSample.excitation}).",
+        ),
     ] = None,
     amplitude: Annotated[
         float | None, typer.Option(help=f"forces: test inputs within ± amplitude, in N ({BoxSample.amplitude:g}).")
     ] = None,
     count: Annotated[
-        int | None, typer.Option(help=f"Test trajectories (forces: {BoxSample.count}, slips: {BallSample.count}).")
+        int | None,
+        typer.Option(help=f"Test trajectories ({BoxSample.count}; slips: {BallSample.count})."),
     ] = None,
     steps: Annotated[
-        int | None, typer.Option(help=f"Steps of each (forces: {BoxSample.steps}, slips: {BallSample.steps}).")
+        int | None,
+        typer.Option(
+            help=f"Steps of each (forces: {BoxSample.steps}, slips: {BallSample.steps}, wheels: {DriveSample.steps})."
+        ),
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(help=f"Seed of the test set (forces: {BoxSample.seed}, slips: {BallSample.seed}).")
+        int | None,
+        typer.Option(help=f"Seed of the test set ({BoxSample.seed}; slips: {BallSample.seed})."),
     ] = None,
     restart: Annotated[
         int | None,
@@ -71,7 +81,8 @@ def evaluate(
 ) -> None:
     """Score a predictor on test trajectories of its own plant and vehicle: RMSE, re-lifted RMSE, largest errors.
 
-    The plant names the test set: a box of states with inputs for forces, the states inside Γ without inputs for slips.
+    The plant names the test set: a box of states with inputs for forces, the states inside Γ without inputs for slips,
+    cars under way with torques and steer for wheels.
     An interrupted evaluation goes on where it stopped. Beside it stand what fits nothing, the first state held and the
     plant linearised there, and the linear predictor of the same data, with a verdict.
 

@@ -18,7 +18,7 @@ from koopcli.cli.options import (
     names,
 )
 from koopcli.config.changes import Changes, Values
-from koopcli.config.samples import Mirror
+from koopcli.config.sampled import Mirror
 from koopcli.config.settings import (
     BaselineKind,
     BasisName,

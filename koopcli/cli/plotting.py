@@ -13,7 +13,7 @@ from koopcli.checks import candidates
 from koopcli.cli.invocation import begin, print_json, write_csv
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption, complete_name
 from koopcli.config.changes import SECTIONS, flat
-from koopcli.config.settings import FigureName, ImageFormat
+from koopcli.config.pictures import FigureName, ImageFormat
 from koopcli.console import show_table
 from koopcli.errors import InvalidValueError, StorageError, UnknownNameError, UsageError
 
@@ -72,7 +72,7 @@ def plot(
     if artefacts and kind.takes == "nothing":
         raise UsageError(f"the figure '{figure}' draws no artefact: leave out {' '.join(artefacts)}")
     if artefacts:
-        told = drawn.TOLD_BESIDE if kind.takes == "predictor" else ()
+        told = drawn.TOLD_BESIDE if kind.takes == "predictor" else ("plot",) if kind.told else ()
         sources = [call.named(one, drawn.TAKES[kind.takes], f"what '{figure}' draws", told) for one in artefacts]
     else:
         for name, _ in flat(call.changes):

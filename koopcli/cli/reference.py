@@ -9,8 +9,9 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import typer
 
 from koopcli.cli.app import app
+from koopcli.config.pictures import PlotOptions
 from koopcli.config.samples import SAMPLES
-from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, PlotOptions, Reproduce, Simulate
+from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
 from koopcli.vehicles.parameters import VehicleParameters
 
 DECLARED: tuple[tuple[str, Any], ...] = (
@@ -43,8 +44,8 @@ def _settings() -> Iterator[str]:
     """Every setting that --set and an experiment file take, from the declarations themselves."""
     yield "## Settings\n"
     yield "For `--set SECTION.KEY=VALUE` and for experiment files; values are TOML. `vehicle.name` chooses a vehicle.\n"
-    yield "`test.box`, `test.point` and `test.ball` take what samples of those kinds take; a setting without its kind,"
-    yield "such as `sample.seed`, holds for the kind in use.\n"
+    yield "`test.box`, `test.point`, `test.ball`, `test.drive-test` and `test.manoeuvre` take what samples of those"
+    yield "kinds take; a setting without its kind, such as `sample.seed`, holds for the kind in use.\n"
     yield "| setting | default | allowed | meaning |\n|---|---|---|---|"
     for section, cls in DECLARED:
         hints = get_type_hints(cls)
@@ -69,6 +70,10 @@ def _allowed(kind: Any, bounds: Mapping[str, Any]) -> str:
 
 
 def _command(name: str, command: Any) -> Iterator[str]:
+    if hasattr(command, "commands"):
+        for part, inner in command.commands.items():
+            yield from _command(f"{name} {part}", inner)
+        return
     about, _, example = command.help.partition("Example: ")
     arguments = [p for p in command.params if p.param_type_name == "argument"]
     options = [p for p in command.params if p.param_type_name == "option"]

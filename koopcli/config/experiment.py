@@ -11,12 +11,13 @@ from typing import Any, TypeVar
 from koopcli.checks import COMMAND_LINE, Origin, build, candidates, from_file
 from koopcli.config.changes import SECTIONS, Changes, Values
 from koopcli.config.data import locate
-from koopcli.config.samples import ELSEWHERE, OF_SIMULATION, OF_VEHICLE, SAMPLES, SampleSettings
-from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, PlotOptions, Reproduce, Simulate
+from koopcli.config.pictures import PlotOptions
+from koopcli.config.samples import ELSEWHERE, OF_SIMULATION, OF_VEHICLE, SAMPLED_FOR, SAMPLES, SampleSettings
+from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, KoopError, UsageError
 from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
 
-KINDS = {"sample": tuple(SAMPLES), "test": ("box", "point", "ball")}
+KINDS = {"sample": tuple(SAMPLES), "test": ("box", "point", "ball", "drive-test", "manoeuvre")}
 DEFAULT_VEHICLE = "ctu-2020"
 
 T = TypeVar("T")
@@ -111,8 +112,9 @@ class Experiment:
             table = there if isinstance(there, Mapping) else {}  # grid and box samples have a setting "box" too
             layers.append(Layer({section: {**table, **loose.get(i, {})}}, layer.origin, layer.folder))
         taken: Values = {name: getattr(vehicle, name) for name in OF_VEHICLE if name in known}
-        if set(OF_SIMULATION) <= known:
-            taken = {"vehicle": vehicle, "dt": self.simulate.dt, "v_eps": self.simulate.v_eps}
+        if "vehicle" in known:
+            simulate = replace(self.simulate, vehicle=vehicle, plant=SAMPLED_FOR[kind]).settled()
+            taken = {name: getattr(simulate, name) for name in OF_SIMULATION if name in known}
         if taken:
             layers = [Layer({section: taken}, COMMAND_LINE, Path()), *layers]
         return _section(SAMPLES[kind], section, layers).settled()

@@ -7,7 +7,7 @@ from typing import Literal
 
 from koopcli.vehicles.parameters import VehicleParameters
 
-PlantName = Literal["forces", "slips"]
+PlantName = Literal["forces", "slips", "wheels"]
 
 UNUSED: dict[str, tuple[str, ...]] = {
     "forces": (
@@ -16,9 +16,14 @@ UNUSED: dict[str, tuple[str, ...]] = {
         "vehicle.mu_scale",
         "vehicle.lateral",
         "vehicle.longitudinal",
+        "vehicle.lateral_rear",
+        "vehicle.longitudinal_rear",
         "simulate.v_eps",
+        "simulate.combined",
+        "simulate.brake_width",
     ),
-    "slips": ("vehicle.J_R", "vehicle.r_w", "simulate.force_per"),
+    "slips": ("vehicle.J_R", "vehicle.r_w", "simulate.force_per", "simulate.brake_width"),
+    "wheels": ("simulate.force_per",),
 }
 
 

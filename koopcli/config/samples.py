@@ -3,55 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, Self
+from typing import Literal
 
 from koopcli.checks import setting
+from koopcli.config.driving import DriveSample, DriveTestSample, ManoeuvreSample
 from koopcli.config.plants import PlantName, used_of
+from koopcli.config.sampled import (
+    BOX,
+    ENERGY,
+    LARGEST,
+    SEED_LIMIT,
+    Draw,
+    Excitation,
+    Kind,
+    Layout,
+    Mesh,
+    Mirror,
+    Sampled,
+)
 from koopcli.vehicles.parameters import VehicleParameters
-
-Kind = Literal["grid", "box", "point", "ellipsoid", "greedy", "ball"]
-Draw = Literal["random", "even", "chebyshev"]
-Layout = Literal["uniform", "product"]
-Mesh = Literal["sphere", "fibonacci"]
-Excitation = Literal["none", "fresh", "held"]
-Mirror = Literal["left-right", "front-rear"]
-
-INPUTS = {"none": "no input", "fresh": "fresh inputs", "held": "held inputs"}  # kinds of excitation in words
-BOX = (30.0, 30.0, 10.0)
-ENERGY = 500e3
-SEED_LIMIT = 2**63 - 1
-LARGEST = 1e12  # of any physical quantity: squares and sums of it stay far inside the floating-point range
-
-
-class Sampled:
-    """What every kind of sample tells of itself; a kind says only what is different."""
-
-    count: int
-    steps: int
-
-    @property
-    def trajectories(self) -> int:
-        """How many trajectories start from the sample."""
-        return self.count
-
-    @property
-    def horizon(self) -> int:
-        """Steps of each trajectory unless told otherwise."""
-        return self.steps
-
-    @property
-    def input_steps(self) -> int | None:
-        """Steps that the sample holds inputs for, None for any number."""
-        return None
-
-    @property
-    def numbers(self) -> int:
-        """How many numbers the sample stores."""
-        return 7 * self.count
-
-    def settled(self) -> Self:
-        """The same sample with what does not matter at its default: one sample, one key."""
-        return self
 
 
 @dataclass(frozen=True)
@@ -65,6 +35,11 @@ class GridSample(Sampled):
     box: tuple[float, ...] = setting(BOX, low=1e-6, high=LARGEST, help="half-width per state: m/s, m/s, rad/s")
     levels: tuple[float, ...] = setting((1.0, 5.0, 10.0, 100.0), low=0, high=LARGEST, unit="N", help="input ranges F_m")
     columns: int = setting(15, low=1, high=100_000, help="input columns per range")
+
+    @property
+    def driven(self) -> bool:
+        """Whether inputs change within or between its trajectories."""
+        return max(self.levels) > 0 and len(self.levels) * self.columns > 1
 
     @property
     def trajectories(self) -> int:
@@ -96,6 +71,11 @@ class BoxSample(Sampled):
     layout: Layout = setting("uniform", help="states uniform in the box, or the product of values drawn per state")
 
     @property
+    def driven(self) -> bool:
+        """Whether inputs change within or between its trajectories."""
+        return self.excitation != "none" and self.amplitude > 0
+
+    @property
     def input_steps(self) -> int | None:
         """Steps that the sample holds inputs for, None for any number."""
         return self.steps if self.excitation == "fresh" else None
@@ -122,6 +102,11 @@ class PointSample(Sampled):
     excitation: Excitation = setting("fresh", help="inputs: none, fresh at each step, or held")
     amplitude: float = setting(1e4, low=0, high=LARGEST, unit="N", help="inputs are uniform in ± amplitude")
     steps: int = setting(300, low=1, high=1_000_000, help="steps of the trajectory")
+
+    @property
+    def driven(self) -> bool:
+        """Whether inputs change within or between its trajectories."""
+        return self.excitation != "none" and self.amplitude > 0
 
     @property
     def trajectories(self) -> int:
@@ -216,7 +201,17 @@ class BallSample(Sampled):
     Jzz: float
 
 
-SampleSettings = GridSample | BoxSample | PointSample | EllipsoidSample | GreedySample | BallSample
+SampleSettings = (
+    GridSample
+    | BoxSample
+    | PointSample
+    | EllipsoidSample
+    | GreedySample
+    | BallSample
+    | DriveSample
+    | DriveTestSample
+    | ManoeuvreSample
+)
 
 SAMPLES: dict[str, type[SampleSettings]] = {
     "grid": GridSample,
@@ -225,9 +220,12 @@ SAMPLES: dict[str, type[SampleSettings]] = {
     "ellipsoid": EllipsoidSample,
     "greedy": GreedySample,
     "ball": BallSample,
+    "drive": DriveSample,
+    "drive-test": DriveTestSample,
+    "manoeuvre": ManoeuvreSample,
 }
-OF_VEHICLE = ("m", "Jzz")  # what a sample by kinetic energy takes from the vehicle
-OF_SIMULATION = ("vehicle", "dt", "v_eps")  # what one that simulates takes from the simulation
+OF_VEHICLE = ("m", "Jzz", "r_w")  # what samples by kinetic energy and those of rolling wheels take from the vehicle
+OF_SIMULATION = ("vehicle", "dt", "v_eps")  # what one that simulates, or steers, takes from the simulation
 ELSEWHERE = {**dict.fromkeys(OF_VEHICLE, "vehicle"), **dict.fromkeys(OF_SIMULATION, "simulate"), "vehicle": "vehicle"}
 
 
@@ -243,6 +241,7 @@ class Custom:
 CUSTOMS: dict[str, Custom] = {
     "forces": Custom("grid", "box", first=1),  # the states are observables, so k = 0 is exact
     "slips": Custom("ellipsoid", "ball", first=0),  # k = 0 is an approximation already
+    "wheels": Custom("drive", "drive-test", first=1),
 }
 
 SAMPLED_FOR: dict[str, PlantName] = {
@@ -252,4 +251,7 @@ SAMPLED_FOR: dict[str, PlantName] = {
     "ellipsoid": "slips",
     "greedy": "slips",
     "ball": "slips",
+    "drive": "wheels",
+    "drive-test": "wheels",
+    "manoeuvre": "wheels",
 }

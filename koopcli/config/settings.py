@@ -12,10 +12,12 @@ from typing import Literal
 
 from koopcli.checks import setting
 from koopcli.config.plants import UNUSED, PlantName, used_of
-from koopcli.config.samples import LARGEST, SEED_LIMIT, Draw, Excitation, Mirror
-from koopcli.vehicles.parameters import MagicFormula, VehicleParameters
+from koopcli.config.sampled import LARGEST, SEED_LIMIT, Draw, Excitation, Mirror
+from koopcli.vehicles.options import CUSTOMARY
+from koopcli.vehicles.parameters import VehicleParameters
 
 ForcePer = Literal["axle", "wheel"]
+Combined = Literal["none", "ellipse"]
 BasisName = Literal["tensor", "total", "anisotropic", "thin-plate", "states"]
 Terms = Literal["linear", "bilinear", "generator"]
 Placement = Literal["k-means", "drawn"]
@@ -27,27 +29,6 @@ LiftName = Literal["nearest", "linear", "mls", "polyharmonic"]
 Coordinates = Literal["state", "world"]
 Scaling = Literal["raw", "extent"]
 BaselineKind = Literal["hold", "rotation", "linearisation"]
-FigureName = Literal[
-    "single-track",
-    "tyre",
-    "orders",
-    "best-order",
-    "random-input",
-    "energy-surface",
-    "error-map",
-    "error-side",
-    "mean-trajectory",
-    "rmse-histogram",
-    "horizon",
-    "compare",
-    "density",
-    "before-after",
-    "modes",
-    "frontier",
-    "trust",
-    "spectrum",
-]
-ImageFormat = Literal["png", "svg", "pdf"]
 
 
 @dataclass(frozen=True)
@@ -57,17 +38,30 @@ class Simulate:
     vehicle: VehicleParameters
     plant: PlantName | None = setting(None, help="equations of motion; else those the sample is for")
     force_per: ForcePer = setting("axle", help="forces: what one input force acts on")
-    v_eps: float = setting(
-        0.1, above=0, high=100, unit="m/s", help="slips: a wheel slower than this counts as that fast"
+    v_eps: float | None = setting(
+        None,
+        above=0,
+        high=100,
+        unit="m/s",
+        help="a wheel slower than this counts as that fast in its slips; else 0.1 (slips) or 0.5 (wheels)",
+    )
+    combined: Combined | None = setting(
+        None, help="how forces along and across a wheel share its grip; else none (slips) or ellipse (wheels)"
+    )
+    brake_width: float | None = setting(
+        None, above=0, high=1e3, unit="rad/s", help="wheels: wheel rate over which brake torques turn; else 1"
     )
     dt: float = setting(0.01, above=0, high=10, unit="s", help="sampling period")
     steps: int | None = setting(None, low=1, high=1_000_000, help="steps of each trajectory; else as the sample has")
+    reference: bool = setting(False, help="integrate by a solver that controls its error, to compare with")
 
     def settled(self) -> Simulate:
-        """The same simulation with everything that its plant does not use at its default."""
+        """The same simulation with what is left open as its plant has it, and what it does not use at its default."""
         plant = self.plant or "forces"
         own = {name.partition(".")[2] for name in UNUSED[plant] if name.startswith("simulate.")}
-        return replace(self, vehicle=used_of(self.vehicle, plant), **{name: getattr(Simulate, name) for name in own})
+        idle = {name: getattr(Simulate, name) for name in own}
+        open_ = {name: value for name, value in CUSTOMARY[plant].items() if getattr(self, name) is None}
+        return replace(self, vehicle=used_of(self.vehicle, plant), **{**idle, **open_})
 
 
 @dataclass(frozen=True)
@@ -206,44 +200,6 @@ class Evaluate:
     restart: int | None = setting(
         None, low=1, high=1_000_000, help="steps until a prediction starts afresh from the true state; else never"
     )
-
-
-@dataclass(frozen=True)
-class Series:
-    """What one of several artefacts is called in a figure, and where it stands on the axis that it is drawn against."""
-
-    label: str
-    at: float | None = None
-
-
-@dataclass(frozen=True)
-class Tyres:
-    """What a figure draws of a vehicle's tyres: ``loads`` of a front and of a rear wheel in N, and its formulas."""
-
-    label: str
-    loads: tuple[float, ...]
-    mu_scale: float
-    lateral: MagicFormula
-    longitudinal: MagicFormula
-
-
-@dataclass(frozen=True)
-class PlotOptions:
-    """What figures can be told."""
-
-    restart: int = setting(50, low=1, high=1_000_000, help="random-input: steps until the prediction starts afresh")
-
-
-@dataclass(frozen=True)
-class Plot:
-    """A figure, what it is told beside its inputs, and the digest of the code that draws it."""
-
-    figure: FigureName
-    format: ImageFormat
-    drawn_by: str
-    series: tuple[Series, ...] = setting((), empty=True)
-    tyres: tuple[Tyres, ...] = setting((), empty=True)
-    restart: int | None = None
 
 
 @dataclass(frozen=True)

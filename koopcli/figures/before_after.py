@@ -11,7 +11,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.figures.balls import LARGEST_SHOWN
 from koopcli.figures.colours import SHADES
 from koopcli.figures.drawing import LOST, Source, column, state_columns, with_error

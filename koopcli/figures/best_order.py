@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from koopcli.config.paper import BEST_ORDERS
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.figures.colours import COLOURS, PAPER
 from koopcli.figures.drawing import Source, column
 from koopcli.figures.orders import select as by_draw

@@ -9,7 +9,7 @@ from textwrap import fill
 import numpy as np
 from matplotlib.figure import Figure
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import Source, column, with_error
 from koopcli.figures.style import COLUMN, LINE, plain, plain_numbers, style

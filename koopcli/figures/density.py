@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.figures.colours import COLOURS, PAPER
 from koopcli.figures.drawing import Source, column, with_error
 from koopcli.figures.style import COLUMN, legend_below, plain_numbers, style

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from koopcli.config.settings import Plot, Series
+from koopcli.config.pictures import Plot, Series
 from koopcli.errors import InvalidValueError
 from koopcli.records import Array, BoolArray, Channels, FloatArray, Packed
 

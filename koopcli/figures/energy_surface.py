@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
 from koopcli.figures.colours import COLOURS, GUIDE
 from koopcli.figures.drawing import Source, column, state_columns

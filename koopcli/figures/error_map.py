@@ -10,7 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.figures.balls import Balls, balls, columns
 from koopcli.figures.colours import SHADES
 from koopcli.figures.drawing import Source

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.figures.balls import Balls, balls, columns
 from koopcli.figures.colours import SHADES, TRAINING
 from koopcli.figures.drawing import Source, column, state_columns
@@ -31,7 +31,7 @@ class ErrorSide:
 
 def select(sources: Sequence[Source], settings: Plot) -> ErrorSide:
     """What the figure shows. Raises ``InvalidValueError`` where every prediction diverged."""
-    training: Trajectories = sources[0].records["training"]
+    training: Trajectories = sources[0].records["training"].finished()
     if training.steps == 1:  # too short to see: every state that is stepped from, once
         starts = np.unique(np.asarray(training.x[:, 0]), axis=0)
         return ErrorSide(balls(sources[0]), starts[spread(len(starts), STARTS), np.newaxis])

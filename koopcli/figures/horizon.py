@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import LOST, Source, column, with_error
 from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
@@ -40,7 +40,8 @@ def select(sources: Sequence[Source], settings: Plot) -> list[ErrorOverTime]:
 
 
 def _over_time(source: Source, shown: BoolArray) -> ErrorOverTime:
-    evaluation, predictor, test = (source.records[role] for role in ("evaluation", "predictor", "trajectories"))
+    evaluation, predictor = source.records["evaluation"], source.records["predictor"]
+    test: Trajectories = source.records["trajectories"].finished()  # the rows of the evaluation
     assert isinstance(test, Trajectories)
     time = test.dt * np.arange(test.steps + 1.0)
     if not shown.any():

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import Source, column, state_columns, with_error
 from koopcli.figures.style import COLUMN, axis_label, style
@@ -30,7 +30,7 @@ class MeanTrajectory:
 def select(sources: Sequence[Source], settings: Plot) -> MeanTrajectory:
     """What the figure shows. Raises ``InvalidValueError`` where every prediction diverged."""
     records = sources[0].records
-    evaluation, predictor, test = records["evaluation"], records["predictor"], records["trajectories"]
+    evaluation, predictor, test = records["evaluation"], records["predictor"], records["trajectories"].finished()
     assert isinstance(test, Trajectories)
     (shown,) = with_error(sources)
     rmse = np.where(shown, evaluation.rmse, np.nan)

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
 from koopcli.figures.colours import MARKERS
 from koopcli.figures.drawing import Source, column

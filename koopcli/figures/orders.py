@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
 from koopcli.figures.colours import COLOURS, MARKERS, PAPER
 from koopcli.figures.drawing import Source, column

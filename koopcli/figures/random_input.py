@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
 from koopcli.figures.colours import COLOURS, GUIDE
 from koopcli.figures.drawing import Source, column, state_columns
@@ -36,7 +36,7 @@ class RandomInput:
 
 def select(sources: Sequence[Source], settings: Plot) -> RandomInput:
     """What the figure shows. Raises ``InvalidValueError`` where a prediction leaves the finite numbers."""
-    predictor, test = sources[0].records["predictor"], sources[0].records["trajectories"]
+    predictor, test = sources[0].records["predictor"], sources[0].records["trajectories"].finished()
     assert isinstance(test, Trajectories)
     assert settings.restart is not None
     x, u = np.asarray(test.x[:1]), np.asarray(test.u[:1])

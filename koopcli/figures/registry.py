@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Literal
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.figures.drawing import Drawing, sources_of
 
-Takes = Literal["evaluation", "predictor", "fit", "sample", "nothing"]
+Takes = Literal["evaluation", "predictor", "fit", "sample", "trajectories", "nothing"]
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,13 @@ FIGURES: dict[str, FigureKind] = {
         (),
         "vehicles",
         told=("tyres",),
+    ),
+    "trajectory": FigureKind(
+        "one simulated trajectory: path, states and inputs",
+        "trajectories",
+        ("trajectories",),
+        "manoeuvre",
+        told=("trajectory",),
     ),
     "orders": FigureKind(
         "RMSE against the order of the basis, beside the paper's best",

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import LOST, Source, column, with_error
 from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc, FancyBboxPatch
 from matplotlib.transforms import Affine2D
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.figures.colours import COLOURS, GUIDE, PAPER
 from koopcli.figures.drawing import Source, column
 from koopcli.figures.style import COLUMN, style

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.figures.colours import COLOURS, GUIDE
 from koopcli.figures.drawing import Source, column
 from koopcli.figures.style import COLUMN, legend_below, style

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from koopcli.config.settings import Plot, Tyres
+from koopcli.config.pictures import Plot, Tyres
 from koopcli.figures.colours import GUIDE
 from koopcli.figures.drawing import Source, column
 from koopcli.figures.style import COLUMN, legend_below, looks, plain, style
@@ -38,18 +38,15 @@ def select(sources: Sequence[Source], settings: Plot) -> list[TyreCurve]:
 
 
 def _curves(tyres: Tyres) -> list[TyreCurve]:
-    front, rear = tyres.loads
-    axles = (
-        [(tyres.label, front)] if front == rear else [(f"{tyres.label}, front", front), (f"{tyres.label}, rear", rear)]
-    )
+    front, rear = zip(tyres.loads, tyres.lateral, tyres.longitudinal, strict=True)
+    alike = front == rear
+    axles = [(tyres.label, front)] if alike else [(f"{tyres.label}, front", front), (f"{tyres.label}, rear", rear)]
     angle = np.linspace(-LARGEST_ANGLE, LARGEST_ANGLE, POINTS)
     ratio = np.linspace(-LARGEST_RATIO, LARGEST_RATIO, POINTS)
     grip = tyres.mu_scale
     return [
-        TyreCurve(
-            label, angle, grip * force(tyres.lateral, angle, load), ratio, grip * force(tyres.longitudinal, ratio, load)
-        )
-        for label, load in axles
+        TyreCurve(label, angle, grip * force(lateral, angle, load), ratio, grip * force(longitudinal, ratio, load))
+        for label, (load, lateral, longitudinal) in axles
     ]
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
-from koopcli.config.samples import INPUTS
+from koopcli.config.sampled import INPUTS
 from koopcli.records import Meta
 from koopcli.reproduction import edmd_cells as blocks
 from koopcli.reproduction.report import Run, Table

@@ -7,7 +7,8 @@ from functools import partial
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
-from koopcli.config.samples import INPUTS, BoxSample, GridSample
+from koopcli.config.sampled import INPUTS
+from koopcli.config.samples import BoxSample, GridSample
 from koopcli.records import Meta
 from koopcli.reproduction import edmd_cells as blocks
 from koopcli.reproduction.claims import claims_table, scores

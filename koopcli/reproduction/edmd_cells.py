@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS
-from koopcli.config.samples import BoxSample, Draw, Excitation, GridSample
+from koopcli.config.sampled import Draw, Excitation
+from koopcli.config.samples import BoxSample, GridSample
 from koopcli.config.settings import OF_BASIS, BasisName, FitEdmd, ForcePer, Terms
 from koopcli.errors import InvalidValueError
 from koopcli.stages import recipes, verdict

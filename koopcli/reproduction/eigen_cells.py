@@ -13,7 +13,7 @@ from koopcli.errors import InvalidValueError
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 from koopcli.stages.makers import prospect
-from koopcli.vehicles.single_track import G
+from koopcli.vehicles.handling import G
 
 CUT = 1e-10  # of the readings with optimal boundary functions
 PEAK = 7800.0  # N, a peak force that does not follow the load

@@ -146,6 +146,36 @@ def box(
     return states, excite(generator, excitation, amplitude, count, steps, inputs)
 
 
+def drive(
+    seed: int,
+    count: int,
+    speeds: tuple[float, float],
+    largest: tuple[float, float, float],
+    r_w: float,
+    excitation: str,
+    magnitudes: tuple[float, float, float],
+    steps: int,
+) -> tuple[FloatArray, FloatArray]:
+    """States of a car on wheels of radius ``r_w`` in m, uniform in v_x between ``speeds`` and in v_y, yaw rate and the
+    slip of either axle within ± ``largest``, with uniform inputs.
+
+    ``magnitudes``: of torque in N m, which drives or brakes, and of front and rear steer in rad. Returns the states
+    (count, 5) and the inputs (count, steps or 1, 6) of the plant ``wheels``.
+    """
+    generator = np.random.default_rng(seed)
+    v_y, yaw_rate, slip = largest
+    v_x = generator.uniform(*speeds, count)
+    around = generator.uniform(-1, 1, (count, 4)) * [v_y, yaw_rate, slip, slip]
+    states = np.column_stack([v_x, around[:, :2], v_x[:, np.newaxis] * (1 + around[:, 2:]) / r_w])
+    drawn = excite(generator, excitation, 1.0, count, steps, 4)
+    torque, steer, steer_rear = magnitudes
+    u = np.empty((*drawn.shape[:2], 6))
+    u[..., 0], u[..., 3] = steer * drawn[..., 0], steer_rear * drawn[..., 2]
+    turning = torque * drawn[..., 1::2]
+    u[..., 1::3], u[..., 2::3] = np.maximum(turning, 0.0), np.maximum(-turning, 0.0)
+    return states, u
+
+
 def excite(
     generator: np.random.Generator, excitation: str, amplitude: float, count: int, steps: int, inputs: int
 ) -> FloatArray:

@@ -6,8 +6,8 @@ from koopcli.checks import build
 from koopcli.config.settings import Baseline
 from koopcli.koopman.baselines import Forecast
 from koopcli.koopman.edmd import coverage
-from koopcli.records import Trajectories
 from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage
+from koopcli.stages.usable import finished
 
 NAMES = {
     "hold": "hold the first state",
@@ -17,7 +17,7 @@ NAMES = {
 
 
 def _run(settings: Baseline, inputs: Inputs, context: Context) -> Forecast:
-    t: Trajectories = inputs["trajectories"]
+    t = finished(inputs["trajectories"], context)
     return Forecast(settings.kind, t.dt, coverage(t), t.state_channels, t.input_channels, t.plant)
 
 

@@ -8,8 +8,9 @@ from typing import Any
 
 from koopcli.checks import build
 from koopcli.config.experiment import Experiment
+from koopcli.config.pictures import ImageFormat, Plot, Series
 from koopcli.config.samples import SAMPLED_FOR
-from koopcli.config.settings import ImageFormat, Plot, Series, Simulate
+from koopcli.config.settings import Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError
 from koopcli.figures import source_digest
 from koopcli.figures.registry import FIGURES, FigureKind
@@ -24,6 +25,7 @@ TAKES: dict[str, tuple[str, ...]] = {
     "predictor": tuple(MAKERS),
     "fit": LIFTED,
     "sample": ("sample",),
+    "trajectories": ("simulate",),
     "nothing": (),
 }
 TOLD_BESIDE = ("test", "plot")  # sections that matter beside a named predictor
@@ -88,6 +90,9 @@ MADE: dict[str, Made] = {
     ),
     "edmd-fit": Made(lambda experiment: [recipes.fit_edmd(experiment)]),
     "surface": Made(lambda experiment: [recipes.sample(experiment.sample("ellipsoid"))]),
+    "manoeuvre": Made(
+        lambda experiment: [recipes.simulation(experiment, recipes.sample(experiment.sample("manoeuvre")))]
+    ),
     "vehicles": Made(
         lambda experiment: [],
         reads=("reproduce.beside", "vehicle.name", *(f"vehicle.{name}" for name in recipes.OF_TYRES)),
@@ -187,6 +192,8 @@ def _behind(task: Task, role: str, experiment: Experiment, simulated: Callable[[
     """An artefact itself, what it was made from, or the test trajectory that is made for a predictor."""
     if role == "training":
         return (task.input("predictor") if task.stage == "evaluate" else task).input("trajectories")
+    if task.stage == "simulate":
+        return task
     if task.stage == "evaluate":
         return task if role == "evaluation" else task.input(role)
     return recipes.driven(experiment, simulated(task)) if role == "trajectories" else task
@@ -216,5 +223,6 @@ def _series(
 
 TOLD: Mapping[str, Callable[[Experiment], Any]] = {
     "restart": lambda experiment: experiment.plot.restart,
+    "trajectory": lambda experiment: experiment.plot.trajectory,
     "tyres": recipes.tyres,
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from koopcli.config.driving import MAGNITUDES
 from koopcli.config.experiment import Experiment
 from koopcli.config.plants import UNUSED
 from koopcli.config.samples import OF_VEHICLE, SAMPLED_FOR, GreedySample
@@ -39,7 +40,7 @@ def _idle_sample(section: str, key: str, tasks: Sequence[Task], behind: Sequence
     tested = _test_samples(behind, ("evaluate", "plot"))
     relevant = tested if section == "test" else _samples(behind) - tested or tested
     driven = {getattr(one.settings, "excitation", None) for one in relevant}
-    if key.rpartition(".")[2] == "amplitude" and driven == {"none"}:
+    if key.rpartition(".")[2] in ("amplitude", *MAGNITUDES) and driven == {"none"}:
         return "the excitation 'none' has no use for it"
     if "." not in key:
         in_use = _test_samples(behind, ("evaluate",)) if section == "test" else relevant

@@ -14,11 +14,12 @@ from koopcli.koopman.predictor import check_horizon
 from koopcli.records import Meta, Packed
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
 from koopcli.stages.makers import prospect
+from koopcli.stages.usable import finished
 from koopcli.vehicles.plants import PLANTS
 
 
 def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
-    predictor, trajectories = inputs["predictor"], inputs["trajectories"]
+    predictor, trajectories = inputs["predictor"], finished(inputs["trajectories"], context)
     assert settings.first is not None, "settled from the plant"
     first = settings.first
 

@@ -14,6 +14,7 @@ from koopcli.koopman.thin_plate import ThinPlate
 from koopcli.records import Trajectories
 from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task
 from koopcli.stages.predictors import describe, figures
+from koopcli.stages.usable import finished
 from koopcli.store.files import size_text
 from koopcli.vehicles.plants import PLANTS
 
@@ -22,7 +23,7 @@ HARMLESS = 1e14  # a condition number that leaves two digits
 
 
 def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
-    trajectories: Trajectories = inputs["trajectories"]
+    trajectories = finished(inputs["trajectories"], context)
     plain = settings.solver == "cholesky-monomials"
     basis = edmd.basis_from_data(trajectories, _choice(settings))
     _warn_of_centres(basis, trajectories, context)

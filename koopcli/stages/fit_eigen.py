@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from koopcli.checks import build
-from koopcli.config.samples import BoxSample, GridSample, PointSample, SampleSettings
 from koopcli.config.settings import PAIRS, FitEigen
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import eigenfunctions
@@ -23,6 +22,7 @@ from koopcli.koopman.tabulated import Tabulated
 from koopcli.records import FloatArray, Meta, Trajectories
 from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task, refuse_beyond_memory
 from koopcli.stages.predictors import describe, figures
+from koopcli.stages.usable import finished
 from koopcli.vehicles.plants import PLANTS, remembered_plant
 from koopcli.vehicles.symmetry import images
 
@@ -30,13 +30,14 @@ SEVERAL = "where trajectories from several energies meet, an eigenfunction has s
 
 
 def _run(settings: FitEigen, inputs: Inputs, context: Context) -> Predictor:
-    trajectories: Trajectories = inputs["trajectories"]
+    trajectories = finished(inputs["trajectories"], context)
     context.progress(0, 2)
     x = eigenfunctions.autonomous(trajectories)
     _check_surface(x, trajectories, context)
     context.progress(1, 2)
     trajectories = replace(trajectories, x=x)  # not read again
-    signs = images(settings.mirror, remembered_plant(trajectories.plant).parameters) if settings.mirror else []
+    plant = remembered_plant(trajectories.plant) if settings.mirror else None
+    signs = [] if plant is None else images(settings.mirror, plant.parameters, plant.states.names)
     complete = eigenfunctions.with_images(trajectories, signs)
     how = reading(settings, trajectories.steps, trajectories.dt)
     return eigenfunctions.fit(complete, how, 1 + len(signs), context.progress)
@@ -131,11 +132,12 @@ def _whole(name: str, seconds: float, dt: float) -> int:
 
 def _check(task: Task) -> None:
     simulation, sample = task.find("simulate"), task.find("sample")
-    if sample is not None and _driven(sample.settings):
+    if sample is not None and sample.settings.driven:
+        kind = sample.settings.kind
+        calm = "leave its inputs out with --set sample.excitation=none" if kind == "drive" else "use kind 'ellipsoid'"
         raise InvalidValueError(
-            f"a sample of kind '{sample.settings.kind}' drives its trajectories with inputs that change, and an "
-            "eigenfunction e^(λt) g(x0) belongs to a system that runs by itself: use a sample of kind 'ellipsoid', "
-            "or fit with fit-edmd"
+            f"a sample of kind '{kind}' drives its trajectories with inputs that change, and an "
+            f"eigenfunction e^(λt) g(x0) belongs to a system that runs by itself: {calm}, or fit with fit-edmd"
         )
     if simulation is None:
         return
@@ -151,18 +153,11 @@ def _check(task: Task) -> None:
     n_x = len(PLANTS[plant.plant].states)
     eigenfunctions.check_modes(found.spectrum.count(n_x), found.horizon if fit.window == "horizon" else plant.steps)
     check_frame(fit.coordinates, PLANTS[plant.plant].states)
-    images(fit.mirror, plant.vehicle)
+    images(fit.mirror, plant.vehicle, PLANTS[plant.plant].states.names)
     if sample is not None:
         splines = 32.0 * sample.settings.trajectories * task.settings.centres  # distances, splines, and their factors
         needed = splines if task.settings.boundary == "thin-plate" else 0.0
         refuse_beyond_memory("the fit", needed + 3 * _estimate(task).bytes, "fit-eigen.centres or sample.count")
-
-
-def _driven(sample: SampleSettings) -> bool:
-    """Whether the inputs of a sample change within or between its trajectories."""
-    if isinstance(sample, GridSample):
-        return max(sample.levels) > 0 and len(sample.levels) * sample.columns > 1
-    return isinstance(sample, (BoxSample, PointSample)) and sample.excitation != "none" and sample.amplitude > 0
 
 
 def _prospect(task: Task) -> Prospect:

@@ -8,9 +8,11 @@ from typing import Any
 
 from koopcli.config.changes import flat
 from koopcli.config.experiment import Experiment
+from koopcli.config.pictures import Series
 from koopcli.config.plants import used_of
-from koopcli.config.samples import INPUTS, BoxSample, PointSample
-from koopcli.config.settings import PAIRS, FitEigen, Series
+from koopcli.config.sampled import INPUTS
+from koopcli.config.samples import BoxSample, PointSample
+from koopcli.config.settings import PAIRS, FitEigen
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.rates import lattice_size
 from koopcli.stages import recipes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from koopcli.checks import build
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.figures.drawing import Drawing
 from koopcli.figures.registry import drawing
 from koopcli.records import Meta
@@ -20,7 +20,7 @@ def _figures(drawing: Drawing) -> Meta:
 
 STAGE = Stage(
     name="plot",
-    version=4,
+    version=5,
     settings=lambda values: build(Plot, values),
     run=_run,
     unpack=Drawing.unpack,

@@ -9,17 +9,20 @@ from typing import get_args
 
 from koopcli.checks import build
 from koopcli.config.experiment import Experiment, load_experiment
-from koopcli.config.samples import CUSTOMS, SAMPLED_FOR, GreedySample, GridSample, Kind, SampleSettings
-from koopcli.config.settings import OF_BASIS, Baseline, BaselineKind, Eigenvalues, FitEdmd, FitEigen, Simulate, Tyres
+from koopcli.config.pictures import Tyres
+from koopcli.config.sampled import Kind
+from koopcli.config.samples import CUSTOMS, SAMPLED_FOR, GreedySample, GridSample, SampleSettings
+from koopcli.config.settings import OF_BASIS, Baseline, BaselineKind, Eigenvalues, FitEdmd, FitEigen, Simulate
 from koopcli.errors import InvalidValueError
 from koopcli.records import Meta
 from koopcli.stages.base import Task
 from koopcli.stages.makers import MAKERS
-from koopcli.vehicles.single_track import wheel_loads
+from koopcli.vehicles.handling import tyres_of, wheel_loads
+from koopcli.vehicles.parameters import TYRES
 
 FITS = tuple(MAKERS)
 BESIDE = (FitEdmd(basis="states"), FitEdmd(order=3), FitEdmd(order=5))  # EDMD of any trajectories, for comparison
-OF_TYRES = ("m", "l_f", "l_r", "mu_scale", "lateral", "longitudinal")  # parameters that tyre forces depend on
+OF_TYRES = ("m", "l_f", "l_r", "mu_scale", *TYRES)  # parameters that tyre forces depend on
 
 
 def sample(settings: SampleSettings) -> Task:
@@ -67,7 +70,8 @@ def test_set(experiment: Experiment, plant: Simulate, **changed: object) -> Task
     kind: Kind = CUSTOMS[plant.plant].test
     if experiment.evaluate.restart is not None and SAMPLED_FOR["point"] == plant.plant:
         kind = "point"
-    settings = replace(experiment.test(kind, plant.vehicle), **changed)  # type: ignore[arg-type]
+    there = replace(experiment, simulate=replace(experiment.simulate, dt=plant.dt))
+    settings = replace(there.test(kind, plant.vehicle), **changed)  # type: ignore[arg-type]
     return Task("simulate", replace(plant, steps=settings.horizon), (("sample", sample(settings)),))
 
 
@@ -187,7 +191,7 @@ def tyres(experiment: Experiment) -> tuple[Tyres, ...]:
         p = there.vehicle
         if p.lateral is None or p.longitudinal is None:
             raise InvalidValueError(f"the vehicle {name} has no tyres: give its file [lateral] and [longitudinal]")
-        found.append(Tyres(name, wheel_loads(p), p.mu_scale, p.lateral, p.longitudinal))
+        found.append(Tyres(name, wheel_loads(p), p.mu_scale, tyres_of(p, "lateral"), tyres_of(p, "longitudinal")))
     return tuple(found)
 
 

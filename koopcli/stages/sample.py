@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from koopcli.checks import build
+from koopcli.config.driving import DriveSample, DriveTestSample, ManoeuvreSample
 from koopcli.config.samples import (
     SAMPLED_FOR,
     SAMPLES,
@@ -23,9 +24,10 @@ from koopcli.errors import InvalidValueError
 from koopcli.records import FloatArray, Meta, Sample
 from koopcli.simulation import designs, sampling
 from koopcli.simulation.integrate import simulate
+from koopcli.simulation.manoeuvres import MANOEUVRES, Driver
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
 from koopcli.vehicles.plants import PLANTS
-from koopcli.vehicles.single_track import SlipInput
+from koopcli.vehicles.single_track import SlipInput, TorqueInput
 from koopcli.vehicles.symmetry import images
 
 
@@ -45,10 +47,27 @@ def _run(settings: SampleSettings, inputs: Inputs, context: Context) -> Sample:
     elif isinstance(s, PointSample):
         states = np.array([s.x0])
         u = sampling.excite(np.random.default_rng(s.seed), s.excitation, s.amplitude, 1, s.steps, n_u)
+    elif isinstance(s, (DriveSample, DriveTestSample)):
+        assert s.r_w is not None, "checked"
+        largest, magnitudes = (s.v_y, s.yaw_rate, s.slip), (s.torque, s.steer, s.steer_rear)
+        speeds = (s.slowest, s.fastest)
+        states, u = sampling.drive(s.seed, s.count, speeds, largest, s.r_w, s.excitation, magnitudes, s.steps)
+    elif isinstance(s, ManoeuvreSample):
+        states, u = _manoeuvre(s)
     else:
         states = _inside(s, context)
         u = np.zeros((len(states), 1, n_u))
     return Sample(factors, states, u, bool(factors), plant.states, plant.inputs)
+
+
+def _manoeuvre(s: ManoeuvreSample) -> tuple[FloatArray, FloatArray]:
+    """The first state (1, 5), on wheels that roll, and the inputs (1, steps, 6)."""
+    assert s.speed is not None, "settled"
+    assert s.vehicle.r_w is not None, "checked"
+    driver = Driver(s.vehicle, s.speed, s.scale)
+    rate = s.speed / s.vehicle.r_w
+    u = MANOEUVRES[s.name].inputs(driver, [k * s.dt for k in range(s.horizon)])
+    return np.array([[s.speed, 0.0, 0.0, rate, rate]]), np.array([u])
 
 
 def _inside(s: EllipsoidSample | GreedySample | BallSample, context: Context) -> FloatArray:
@@ -69,7 +88,7 @@ def _inside(s: EllipsoidSample | GreedySample | BallSample, context: Context) ->
         s.count,
         flow,
         round(s.usable / s.dt) + 1,
-        images(s.mirror, s.vehicle),
+        images(s.mirror, s.vehicle, plant.states.names),
         lambda x: np.asarray(x / semi_axes),
         context.progress,
     )
@@ -93,12 +112,26 @@ def _check(task: Task) -> None:
         sampling.check_mesh(s.mesh, s.count)
     if isinstance(s, GreedySample):
         _check_greedy(s)
+    if isinstance(s, (DriveSample, DriveTestSample)):
+        _check_drive(s)
+    if isinstance(s, ManoeuvreSample):
+        TorqueInput(s.vehicle)
     refuse_beyond_memory("the sample", _estimate(task).bytes, "sample.count")
 
 
+def _check_drive(s: DriveSample | DriveTestSample) -> None:
+    if s.r_w is None:
+        raise InvalidValueError(
+            f"a sample of kind '{s.kind}' needs a vehicle with wheels: give the vehicle file their radius r_w"
+        )
+    if s.slowest > s.fastest:
+        raise InvalidValueError(
+            f"'sample.slowest' {s.slowest:g} m/s must not be above 'sample.fastest' {s.fastest:g} m/s"
+        )
+
+
 def _check_greedy(s: GreedySample) -> None:
-    images(s.mirror, s.vehicle)
-    SlipInput(s.vehicle, s.v_eps)
+    images(s.mirror, s.vehicle, SlipInput(s.vehicle, s.v_eps).states.names)
     length = s.steps * s.dt
     if s.count < 1:
         raise InvalidValueError(f"'sample.budget' of {s.budget:g} s does not pay for one trajectory of {length:g} s")

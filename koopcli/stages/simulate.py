@@ -7,13 +7,19 @@ from dataclasses import asdict
 import numpy as np
 
 from koopcli.checks import build
+from koopcli.config.driving import ManoeuvreSample
 from koopcli.config.samples import SAMPLED_FOR
 from koopcli.config.settings import Simulate
 from koopcli.errors import InvalidValueError
-from koopcli.records import Meta, Sample, Trajectories
-from koopcli.simulation.integrate import simulate
+from koopcli.records import ENDS, Course, Meta, Sample, Trajectories
+from koopcli.simulation.integrate import STIFF, integrate
+from koopcli.simulation.reference import reference
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
-from koopcli.vehicles.plants import PLANTS, Plant, make_plant
+from koopcli.vehicles.options import OPTIONS, Options
+from koopcli.vehicles.plants import PLANTS, Plant
+
+SECONDS_A_STEP = {"forces": 3e-7, "slips": 1e-5, "wheels": 3e-5}
+REFERENCE_STEP = 3e-3
 
 
 def _run(settings: Simulate, inputs: Inputs, context: Context) -> Trajectories:
@@ -22,32 +28,64 @@ def _run(settings: Simulate, inputs: Inputs, context: Context) -> Trajectories:
     assert settings.plant is not None
     plant = _plant(settings)
     x0, u = sample.expand(settings.steps)
-    with np.errstate(over="ignore", invalid="ignore"):
-        x = simulate(plant.rhs, x0, u, settings.dt, context.progress, plant.fastest_rate)
-    lost = ~np.isfinite(x).all(axis=(1, 2))
-    if lost.any():
-        raise InvalidValueError(
-            f"{lost.sum()} of {len(x)} simulated trajectories leave the finite numbers, the first is number "
-            f"{int(lost.argmax())}: lower simulate.dt, the steps or the input amplitude"
-        )
-    about = {name: getattr(settings, name) for name in ("plant", "force_per", "v_eps")}
+    if settings.reference:
+        x, course = reference(plant.rhs, x0, u, settings.dt, context.progress)
+    else:
+        x, course = integrate(plant.rhs, x0, u, settings.dt, context.progress, plant.fastest_rate)
+    _report(course, context)
+    about = {name: getattr(settings, name) for name in ("plant", *OPTIONS)}
     about["vehicle"] = asdict(settings.vehicle)
-    return Trajectories(x, u, settings.dt, plant.states, plant.inputs, sample.product, about)
+    return Trajectories(x, u, settings.dt, plant.states, plant.inputs, sample.product, about, course)
+
+
+def _report(course: Course, context: Context) -> None:
+    """Say which trajectories ended early. Raises ``InvalidValueError`` where none ran its whole length."""
+    ended = ~course.finished
+    if not ended.any():
+        return
+    said = []
+    for reason in np.unique(course.reason[ended]).tolist():
+        rows = np.flatnonzero(course.reason == reason)
+        said.append(f"{len(rows)} of {len(ended)} {ENDS[reason]}, the first is number {rows[0]}")
+    text = "; ".join(said)
+    if ended.all():
+        remedy = ", or raise simulate.v_eps" if STIFF in course.reason else ", the steps or the inputs"
+        raise InvalidValueError(f"no trajectory runs its whole length: {text}; lower simulate.dt{remedy}")
+    context.warn(f"{text}; they are kept up to their ends, and left out of fits and scores")
 
 
 def _figures(trajectories: Trajectories) -> Meta:
-    product = trajectories.product
+    product, course = trajectories.product, trajectories.course
+    assert course is not None, "of what was simulated here"
+    ended = {ENDS[reason]: int((course.reason == reason).sum()) for reason in np.unique(course.reason) if reason}
+    most = course.substeps
     return {
         "trajectories": len(trajectories),
         "steps": trajectories.steps,
         "dt": trajectories.dt,
         "product": list(product) if product else None,
+        "substeps": {"min": int(most.min()), "median": float(np.median(most)), "max": int(most.max())},
+        "ended": ended,
     }
+
+
+def _describe(figures: Meta) -> str:
+    found = f"{figures['trajectories']} trajectories × {figures['steps']} steps of {figures['dt']} s"
+    most = figures["substeps"]
+    if most["max"] == 0:
+        found += ", by the reference solver"
+    elif most["max"] > 1:
+        span = (
+            f"{most['min']} to {most['max']}, median {most['median']:g}" if most["min"] < most["max"] else most["max"]
+        )
+        found += f", substeps at most: {span}"
+    return "; ".join([found, *(f"{count} {reason}" for reason, count in figures["ended"].items())])
 
 
 def _plant(settings: Simulate) -> Plant:
     assert settings.plant is not None, "settled from the sample"
-    return make_plant(settings.plant, settings.vehicle, settings.force_per, settings.v_eps)
+    options = Options(**{name: getattr(settings, name) for name in OPTIONS})
+    return PLANTS[settings.plant].configured(settings.vehicle, options)
 
 
 def _check(task: Task) -> None:
@@ -60,6 +98,11 @@ def _check(task: Task) -> None:
             f"use a sample of kind {' or '.join(kinds)}"
         )
     _plant(task.settings)
+    if isinstance(sample, ManoeuvreSample) and sample.dt != task.settings.dt:
+        raise InvalidValueError(
+            f"the sample holds the inputs of a manoeuvre every {sample.dt:g} s, 'simulate.dt' is "
+            f"{task.settings.dt:g} s: sample again with --set simulate.dt={task.settings.dt:g}"
+        )
     if sample.input_steps is not None and steps > sample.input_steps:
         raise InvalidValueError(
             f"the sample holds fresh inputs for {sample.input_steps} steps, 'simulate.steps' is {steps}: "
@@ -70,18 +113,23 @@ def _check(task: Task) -> None:
 
 def _estimate(task: Task) -> Cost:
     n, steps = task.ancestor("sample").settings.trajectories, task.settings.steps
-    each = 3e-7 if task.settings.plant == "forces" else 1e-5 * max(1.0, task.settings.dt / 0.01)  # s, with substeps
-    return Cost(each * n * steps, 8.0 * n * (3 * (steps + 1) + 4 * steps))
+    plant = PLANTS[task.settings.plant]
+    each = SECONDS_A_STEP[task.settings.plant]
+    if each > SECONDS_A_STEP["forces"]:
+        each *= max(1.0, task.settings.dt / 0.01)  # stiff: a longer step is walked through in more
+    if task.settings.reference:
+        each = REFERENCE_STEP
+    return Cost(each * n * steps, 8.0 * n * (len(plant.states) * (steps + 1) + len(plant.inputs) * steps + 3))
 
 
 STAGE = Stage(
     name="simulate",
-    version=2,
+    version=3,
     settings=lambda values: build(Simulate, values),
     run=_run,
     unpack=Trajectories.unpack,
     figures=_figures,
-    describe=lambda f: f"{f['trajectories']} trajectories × {f['steps']} steps of {f['dt']} s",
+    describe=_describe,
     check=_check,
     estimate=_estimate,
 )

@@ -20,6 +20,9 @@ class MagicFormula:
     C: float = setting(above=0, high=10, unit="1", help="shape factor")
     mu: float = setting(low=0, high=1e3, unit="1", help="peak force over load")
     E: float = setting(low=-1e3, high=1, unit="1", help="curvature factor")
+    S_h: float = setting(
+        0.0, low=-1, high=1, unit="1", help="shift of the slip angle of a left wheel, mirrored for a right one"
+    )
 
 
 @dataclass(frozen=True)
@@ -38,14 +41,42 @@ class VehicleParameters:
     mu_scale: float = setting(1.0, low=0, high=100, unit="1", help="grip of the road: factor on every tyre force")
     lateral: MagicFormula | None = setting(None, help="tyre forces from slip angles")
     longitudinal: MagicFormula | None = setting(None, help="tyre forces from slip ratios")
+    lateral_rear: MagicFormula | None = setting(None, help="those of the rear wheels; else as in front")
+    longitudinal_rear: MagicFormula | None = setting(None, help="those of the rear wheels; else as in front")
+
+    def __post_init__(self) -> None:
+        for front, rear in REAR.items():
+            if getattr(self, rear) is not None and getattr(self, front) is None:
+                raise InvalidValueError(f"'{rear}' stands beside '{front}', which is missing: give that of the front")
+        for name in ("longitudinal", "longitudinal_rear"):
+            there: MagicFormula | None = getattr(self, name)
+            if there is not None and there.S_h != 0:
+                raise InvalidValueError(
+                    f"'{name}.S_h' must be 0, got {there.S_h:g}: a shift along the wheel would push a standing car"
+                )
 
 
+REAR = {"lateral": "lateral_rear", "longitudinal": "longitudinal_rear"}  # tyres in front, and behind where they differ
 TYRES = tuple(f.name for f in fields(VehicleParameters) if "MagicFormula" in str(f.type))  # tables of their own
 IN_PARAMETERS = {f.name: f.metadata["unit"] for f in fields(VehicleParameters) if f.name not in TYRES}
 
 
+@dataclass(frozen=True)
+class VehicleFile:
+    """What a vehicle file holds; ``title`` and ``source`` may be missing."""
+
+    title: str
+    source: str
+    parameters: VehicleParameters
+
+
 def read_vehicle(path: Path) -> VehicleParameters:
-    """The parameters in the vehicle file ``path``.
+    """The parameters in the vehicle file ``path``; raises as :func:`read_vehicle_file`."""
+    return read_vehicle_file(path).parameters
+
+
+def read_vehicle_file(path: Path) -> VehicleFile:
+    """The vehicle file ``path``.
 
     Raises ``InvalidValueError``, naming file and key, for a file that cannot be read, a missing or unknown key,
     a value out of range, or a unit other than the SI unit of that key.
@@ -72,7 +103,15 @@ def read_vehicle(path: Path) -> VehicleParameters:
         for name in TYRES
         if name in content
     }
-    return build(VehicleParameters, {**vars(vehicle), **tyres}, here)
+    about = {key: content.get(key, "") for key in ("title", "source")}
+    for key, text in about.items():
+        if not isinstance(text, str):
+            raise InvalidValueError(here.say(f"'{key}' must be a text, got {text!r}"))
+    try:
+        return VehicleFile(**about, parameters=build(VehicleParameters, {**vars(vehicle), **tyres}, here))
+    except InvalidValueError as error:
+        text = str(error)
+        raise InvalidValueError(text if text.startswith(here.say("")) else here.say(text)) from error
 
 
 def change(vehicle: VehicleParameters, changes: Mapping[str, object], origin: Origin) -> VehicleParameters:

@@ -7,16 +7,17 @@ from typing import Any, Protocol, Self
 
 from koopcli.checks import build
 from koopcli.records import Channels, FloatArray
+from koopcli.vehicles.options import OPTIONS, Options
 from koopcli.vehicles.parameters import VehicleParameters
-from koopcli.vehicles.single_track import ForceInput, SlipInput
+from koopcli.vehicles.single_track import ForceInput, SlipInput, TorqueInput
 
 
 class Plant(Protocol):
     """A continuous-time system dx/dt = rhs(x, u), vectorised over leading axes."""
 
     @classmethod
-    def configured(cls, parameters: VehicleParameters, *, force_per: str, v_eps: float) -> Self:
-        """The plant of a vehicle, with those of the options that it has a use for."""
+    def configured(cls, parameters: VehicleParameters, options: Options) -> Self:
+        """The plant of a vehicle with the ``options`` that it has a use for."""
 
     @property
     def parameters(self) -> VehicleParameters:
@@ -40,18 +41,14 @@ class Plant(Protocol):
         """Kinetic energy in J (...,) of the states ``x`` (..., n_x)."""
 
 
-PLANTS: dict[str, type[ForceInput] | type[SlipInput]] = {
+PLANTS: dict[str, type[ForceInput] | type[SlipInput] | type[TorqueInput]] = {
     "forces": ForceInput,
     "slips": SlipInput,
+    "wheels": TorqueInput,
 }
-
-
-def make_plant(name: str, vehicle: VehicleParameters, force_per: str, v_eps: float) -> Plant:
-    """The plant ``name`` of a vehicle, with those of the options that it has."""
-    return PLANTS[name].configured(vehicle, force_per=force_per, v_eps=v_eps)
 
 
 def remembered_plant(about: Mapping[str, Any]) -> Plant:
     """The plant that trajectories or a predictor carry along as JSON."""
-    vehicle = build(VehicleParameters, about["vehicle"])
-    return make_plant(about["plant"], vehicle, about["force_per"], about["v_eps"])
+    options = Options(**{name: about[name] for name in OPTIONS if name in about})
+    return PLANTS[about["plant"]].configured(build(VehicleParameters, about["vehicle"]), options)

@@ -2,37 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from koopcli.errors import InvalidValueError
 from koopcli.records import FloatArray
 from koopcli.vehicles.parameters import VehicleParameters
 
-MIRRORS: dict[str, tuple[float, float, float]] = {
-    "left-right": (1.0, -1.0, -1.0),
-    "front-rear": (-1.0, 1.0, -1.0),
-}  # signs of v_x, v_y and the yaw rate; without inputs, f(S x) = S f(x) (6.6)
+MIRRORS: dict[str, dict[str, float]] = {
+    "left-right": {"v_x": 1.0, "v_y": -1.0, "yaw_rate": -1.0, "wheel_rate_f": 1.0, "wheel_rate_r": 1.0},
+    "front-rear": {"v_x": -1.0, "v_y": 1.0, "yaw_rate": -1.0},
+}  # signs of states; without inputs, f(S x) = S f(x) (6.6)
 
 
-def signs(name: str, p: VehicleParameters) -> FloatArray:
-    """The signs (3,) that the states of a vehicle change under the mirror ``name``.
+def signs(name: str, p: VehicleParameters, states: Sequence[str]) -> FloatArray:
+    """The signs (n_x,) that the ``states`` of a vehicle change under the mirror ``name``.
 
-    Raises ``InvalidValueError`` for a vehicle without that symmetry.
+    Raises ``InvalidValueError`` for a vehicle without that symmetry, and for states that change places under it.
     """
+    if strange := [state for state in states if state not in MIRRORS[name]]:
+        raise InvalidValueError(f"the mirror '{name}' changes more than the sign of {', '.join(strange)}: leave it out")
+    if name == "front-rear" and (p.lateral_rear or p.lateral) != p.lateral:
+        raise InvalidValueError(
+            "this vehicle has no front-rear symmetry: its axles have different tyres; leave the mirror out"
+        )
     if name == "front-rear" and p.l_f != p.l_r:
         raise InvalidValueError(
             f"this vehicle has no front-rear symmetry: its axles differ in their arms (l_f {p.l_f:g} m, l_r {p.l_r:g} "
             "m) and so in their loads; leave out the mirror 'front-rear'"
         )
-    return np.array(MIRRORS[name])
+    return np.array([MIRRORS[name][state] for state in states])
 
 
-def images(names: tuple[str, ...], p: VehicleParameters) -> list[FloatArray]:
+def images(names: tuple[str, ...], p: VehicleParameters, states: Sequence[str]) -> list[FloatArray]:
     """The signs of every image but the original, of mirrors and of their combinations.
 
     Raises ``InvalidValueError`` for a vehicle without one of the symmetries.
     """
-    found = [np.ones(3)]
+    found = [np.ones(len(states))]
     for name in names:
-        found += [one * signs(name, p) for one in found]
+        found += [one * signs(name, p, states) for one in found]
     return found[1:]

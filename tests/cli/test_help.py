@@ -11,7 +11,14 @@ from koopcli.cli.app import app
 from koopcli.cli.reference import reference
 
 ROOT = Path(__file__).parents[2]
-COMMANDS = typer.main.get_command(app).commands
+TOP = typer.main.get_command(app).commands
+COMMANDS = {
+    " ".join([name, *part]): inner
+    for name, command in TOP.items()
+    for part, inner in (
+        [([], command)] if not hasattr(command, "commands") else [([p], c) for p, c in command.commands.items()]
+    )
+}
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -6,12 +6,13 @@ from typing import get_args, get_type_hints
 
 import pytest
 
-from koopcli.config import plants, samples, settings
+from koopcli.config import driving, pictures, plants, sampled, samples, settings
 from koopcli.config.changes import SECTIONS, parse_set
 from koopcli.config.data import data_folder
 from koopcli.config.experiment import load_experiment
+from koopcli.config.pictures import PlotOptions
 from koopcli.config.samples import SAMPLES, BoxSample, GridSample
-from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, PlotOptions, Reproduce, Simulate
+from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError, UsageError
 from koopcli.figures.registry import FIGURES
 from koopcli.koopman.baselines import FORECASTS
@@ -20,7 +21,10 @@ from koopcli.koopman.frames import FRAMES
 from koopcli.koopman.lookup import LOOKUPS
 from koopcli.koopman.rates import RATES
 from koopcli.koopman.thin_plate import PLACEMENTS
+from koopcli.simulation.manoeuvres import MANOEUVRES
 from koopcli.simulation.sampling import DRAWS, MESHES
+from koopcli.vehicles.axles import COMBINED
+from koopcli.vehicles.options import CUSTOMARY
 from koopcli.vehicles.plants import PLANTS
 from koopcli.vehicles.single_track import WHEELS_PER_FORCE
 from koopcli.vehicles.symmetry import MIRRORS
@@ -31,23 +35,26 @@ PAPER = tomllib.loads((data_folder() / "experiments" / "paper.toml").read_text()
 @pytest.mark.parametrize(
     ("literal", "registry"),
     [
-        (samples.Draw, DRAWS),
+        (sampled.Draw, DRAWS),
         (plants.PlantName, PLANTS),
         (settings.ForcePer, WHEELS_PER_FORCE),
         (settings.BasisName, BASES),
         (settings.BasisName, settings.OF_BASIS),
         (settings.Placement, PLACEMENTS),
-        (settings.FigureName, FIGURES),
-        (samples.Kind, samples.SAMPLES),
-        (samples.Kind, samples.SAMPLED_FOR),
+        (pictures.FigureName, FIGURES),
+        (sampled.Kind, samples.SAMPLES),
+        (sampled.Kind, samples.SAMPLED_FOR),
         (plants.PlantName, samples.CUSTOMS),
-        (samples.PlantName, plants.UNUSED),
-        (samples.Excitation, samples.INPUTS),
-        (samples.Mesh, MESHES),
+        (plants.PlantName, plants.UNUSED),
+        (plants.PlantName, CUSTOMARY),
+        (settings.Combined, COMBINED),
+        (driving.ManoeuvreName, MANOEUVRES),
+        (sampled.Excitation, sampled.INPUTS),
+        (sampled.Mesh, MESHES),
         (settings.LiftName, LOOKUPS),
         (settings.Eigenvalues, RATES),
         (settings.Coordinates, FRAMES),
-        (samples.Mirror, MIRRORS),
+        (sampled.Mirror, MIRRORS),
         (settings.BaselineKind, FORECASTS),
     ],
 )
@@ -71,6 +78,10 @@ def test_the_paper_file_writes_out_every_default():
     assert loaded.test("ball", vehicle) == SAMPLES["ball"](**body)
     simulation = {"vehicle": vehicle, "dt": 0.01, "v_eps": 0.1}
     assert loaded.sample("greedy") == SAMPLES["greedy"](**simulation).settled()
+    rolling = {"r_w": vehicle.r_w}
+    assert loaded.sample("drive") == SAMPLES["drive"](**rolling)
+    assert loaded.test("drive-test", vehicle) == SAMPLES["drive-test"](**rolling)
+    assert loaded.sample("manoeuvre") == SAMPLES["manoeuvre"](vehicle=vehicle, dt=0.01).settled()
     assert loaded.fit_edmd == FitEdmd()
     assert loaded.fit_eigen == FitEigen()
     assert loaded.evaluate == Evaluate()
@@ -83,8 +94,14 @@ def test_the_paper_file_writes_out_every_default():
         ("test", "box"),
         ("test", "point"),
         ("test", "ball"),
+        ("sample", "drive"),
+        ("sample", "manoeuvre"),
+        ("test", "drive-test"),
     ):
-        assert set(PAPER[section][kind]) == {f.name for f in fields(SAMPLES[kind])} - {"kind", *samples.ELSEWHERE}
+        left = {f.name for f in fields(SAMPLES[kind]) if f.default is None}
+        assert (
+            set(PAPER[section][kind]) == {f.name for f in fields(SAMPLES[kind])} - {"kind", *samples.ELSEWHERE} - left
+        )
     for section, cls in {"fit-edmd": FitEdmd, "fit-eigen": FitEigen, "evaluate": Evaluate}.items():
         assert set(PAPER[section]) == {f.name for f in fields(cls) if f.default is not None}
     assert set(PAPER["reproduce"]) == {f.name for f in fields(Reproduce)}

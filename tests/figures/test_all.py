@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from koopcli.config.settings import ImageFormat
+from koopcli.config.pictures import ImageFormat
 from koopcli.errors import InvalidValueError
 from koopcli.figures import style
 from koopcli.figures.colours import COLOURS

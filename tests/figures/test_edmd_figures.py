@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from koopcli.config.settings import Plot
+from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
 from koopcli.figures import orders, random_input, spectrum
 from koopcli.figures.drawing import Source

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from koopcli.figures import single_track, tyre
+from koopcli.vehicles.handling import wheel_loads
 from koopcli.vehicles.single_track import SlipInput
 from tests.stages.toys import CAR, figure_settings
 
@@ -16,7 +17,7 @@ def test_tyre_curves_are_the_forces_of_the_plant():
     """A car that slides sideways feels two wheels an axle at the slip angle of its velocity."""
     settings = figure_settings("tyre")
     plant = SlipInput(replace(CAR, c_w=0.0))
-    front, rear = plant._loads
+    front, rear = wheel_loads(CAR)
     told = replace(settings.tyres[0], label="car", loads=(front, rear), mu_scale=CAR.mu_scale)
     curves = {curve.label: curve for curve in tyre.select([], replace(settings, tyres=(told,)))}
     assert set(curves) == {"car, front", "car, rear"}

@@ -48,7 +48,7 @@ def _make(plant, design):
     if design in sampling.MESHES:
         x0 = sampling.shells(sampling.MESHES[design](441), 6) * axes
         return trajectories_of(plant, replace(gamma, states=x0, inputs=np.zeros((len(x0), 1, 4))), 80)
-    mirror = images(("left-right",), p) if design == "images" else []
+    mirror = images(("left-right",), p, plant.states.names) if design == "images" else []
 
     def flow(x0):
         return simulate(plant.rhs, x0, np.zeros((len(x0), 100, 4)), 0.01, fastest_rate=plant.fastest_rate)

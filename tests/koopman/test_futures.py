@@ -183,7 +183,7 @@ def test_a_window_that_is_too_short(rolling):
 
 def test_images_are_data_and_make_the_predictor_symmetric(rolling, sliding):
     data, test = rolling
-    signs = images(("left-right", "front-rear"), sliding.parameters)
+    signs = images(("left-right", "front-rear"), sliding.parameters, sliding.states.names)
     more = with_images(data, signs)
     assert len(more) == 4 * len(data)
     given = {**AHEAD, "lift": "polyharmonic", "frame": "world", "tabulated": 50, "nodes": 10}

@@ -13,8 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from koopcli.checks import build
+from koopcli.config.driving import DriveSample, ManoeuvreSample
+from koopcli.config.pictures import Plot, Series, Tyres
 from koopcli.config.samples import BallSample, BoxSample, EllipsoidSample, GreedySample, GridSample, PointSample
-from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Plot, Series, Simulate, Tyres
+from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Simulate
 from koopcli.figures.registry import FIGURES
 from koopcli.koopman.baselines import Forecast
 from koopcli.koopman.coverage import Coverage
@@ -28,10 +30,11 @@ from koopcli.koopman.tabulated import Tabulated
 from koopcli.koopman.trust import Trust
 from koopcli.progress import silent
 from koopcli.records import Sample, Trajectories
+from koopcli.simulation.manoeuvres import MANOEUVRES
 from koopcli.stages.base import Context
 from koopcli.stages.registry import STAGES
 from koopcli.vehicles.parameters import MagicFormula, VehicleParameters
-from koopcli.vehicles.single_track import ForceInput, SlipInput
+from koopcli.vehicles.single_track import ForceInput, SlipInput, TorqueInput
 
 PINS = Path(__file__).parents[1] / "golden" / "stages.json"
 BEYOND = 1e12  # a condition number past this is rounding
@@ -48,6 +51,7 @@ CAR = VehicleParameters(
     lateral=MagicFormula(B=8.0, C=1.4, mu=1.1, E=-0.5),
     longitudinal=MagicFormula(B=10.0, C=1.6, mu=1.2, E=0.3),
 )
+ON_WHEELS = replace(CAR, J_R=1.1, r_w=0.32, lateral_rear=MagicFormula(B=9.0, C=1.3, mu=1.2, E=-0.4, S_h=0.005))
 STATES, INPUTS = ForceInput.states, ForceInput.inputs
 
 
@@ -155,6 +159,14 @@ def _slid() -> Sample:
     return Sample((), np.array([[20.0, 1, 2], [-5, 3, -8], [0.01, -2, 5]]), u, False, STATES, SlipInput.inputs)
 
 
+def _driven() -> Sample:
+    """On wheels: under way, in a skid in reverse, and nearly at rest on spinning wheels."""
+    u = np.sin(np.arange(18.0) ** 2).reshape(3, 1, 6) * [0.1, 300, 300, 0.05, 300, 300]
+    u[..., 2::3] = np.abs(u[..., 2::3])
+    x0 = np.array([[20.0, 1, 0.5, 60, 61], [-5, 3, -2, -10, -20], [0.01, -0.2, 0.1, 5, 8]])
+    return Sample((), x0, u, False, TorqueInput.states, TorqueInput.inputs)
+
+
 def _few() -> Trajectories:
     """As many trajectories as the evaluation has scores."""
     data = _calm()
@@ -174,8 +186,9 @@ def figure_settings(name: str) -> Plot:
     labels = {"one": (), "beside": ("one", "another"), "points": ("one", "one")}[kind.draws]
     told = {
         "restart": 3,
+        "trajectory": 1,
         "tyres": tuple(
-            Tyres(label, loads, 0.9, CAR.lateral, CAR.longitudinal)
+            Tyres(label, loads, 0.9, 2 * (CAR.lateral,), 2 * (CAR.longitudinal,))
             for label, loads in (("even", (3000.0, 3000.0)), ("nose-heavy", (4000.0, 3000.0)))
         ),
     }
@@ -197,7 +210,7 @@ def figure_records(name: str) -> dict:
     records = {
         "evaluation": _evaluation(),
         "predictor": _predictor() if kind.takes in ("predictor", "fit") else _looked_up(),
-        "trajectories": _trajectories(7) if kind.takes == "predictor" else _few(),
+        "trajectories": _trajectories(7) if kind.takes in ("predictor", "trajectories") else _few(),
         "training": _gliding(),
         "sample": _on_a_surface(),
     }
@@ -221,6 +234,9 @@ TOYS = {
         (PointSample(x0=(3.0, 2.0, 1.0), excitation="held", seed=5), {}),
         (GridSample(seed=3, count=4, columns=2, draw="chebyshev"), {}),
         (EllipsoidSample(count=12, mesh="fibonacci", shells=3, m=1200.0, Jzz=1500.0), {}),
+        (DriveSample(count=4, r_w=0.3), {}),
+        (DriveSample(count=4, r_w=0.3, excitation="fresh", steps=3, seed=2), {}),
+        *((ManoeuvreSample(name=name, vehicle=ON_WHEELS, dt=0.05).settled(), {}) for name in MANOEUVRES),
         (
             GreedySample(
                 budget=4.0,
@@ -239,6 +255,9 @@ TOYS = {
         (Simulate(vehicle=CAR, plant="forces", steps=3), {"sample": _sample()}),
         (Simulate(vehicle=CAR, plant="forces", steps=2, force_per="wheel", dt=0.02), {"sample": _sample()}),
         (Simulate(vehicle=CAR, plant="slips", steps=40), {"sample": _slid()}),
+        (Simulate(vehicle=ON_WHEELS, plant="wheels", steps=20), {"sample": _driven()}),
+        (Simulate(vehicle=ON_WHEELS, plant="wheels", steps=3, combined="none", v_eps=0.3), {"sample": _driven()}),
+        (Simulate(vehicle=ON_WHEELS, plant="wheels", steps=3, reference=True), {"sample": _driven()}),
     ],
     "fit-edmd": [
         (FitEdmd(order=2), {"trajectories": _trajectories(1)}),

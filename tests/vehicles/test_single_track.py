@@ -7,7 +7,8 @@ import pytest
 
 from koopcli.errors import InvalidValueError
 from koopcli.simulation.integrate import simulate
-from koopcli.vehicles.plants import PLANTS, make_plant, remembered_plant
+from koopcli.vehicles.options import Options
+from koopcli.vehicles.plants import PLANTS, remembered_plant
 from koopcli.vehicles.single_track import WHEELS_PER_FORCE, ForceInput, SlipInput
 from tests.conftest import ball_of, surface_of
 
@@ -81,7 +82,7 @@ def test_the_power_of_the_forces_is_what_the_energy_gains(plant, vehicle, states
 @pytest.mark.parametrize("name", PLANTS)
 def test_every_plant_keeps_the_contract(name, vehicle):
     for force_per in WHEELS_PER_FORCE:
-        plant = make_plant(name, vehicle, force_per, 0.1)
+        plant = PLANTS[name].configured(vehicle, Options(force_per=force_per))
         n_x, n_u = len(plant.states), len(plant.inputs)
         assert len(plant.states.units) == n_x
         x, u = np.ones((5, 2, n_x)), np.ones((5, 2, n_u))
@@ -167,5 +168,5 @@ def test_a_vehicle_without_tyres_is_refused_for_the_slip_plant(vehicle):
 def test_a_plant_is_remembered_through_json(slips):
     from dataclasses import asdict
 
-    about = {"plant": "slips", "force_per": "axle", "v_eps": 0.3, "vehicle": asdict(slips.parameters)}
-    assert remembered_plant(json.loads(json.dumps(about))) == SlipInput(slips.parameters, 0.3)
+    about = {"plant": "slips", "vehicle": asdict(slips.parameters), **asdict(Options(v_eps=0.3, combined="ellipse"))}
+    assert remembered_plant(json.loads(json.dumps(about))) == SlipInput(slips.parameters, 0.3, "ellipse")

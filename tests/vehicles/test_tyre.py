@@ -24,7 +24,7 @@ def test_no_slip_no_force_and_odd(tyre):
 def test_the_slope_at_zero_is_the_stiffness(tyre):
     h = np.array([1e-6])
     slope = (force(tyre, h, LOAD) - force(tyre, -h, LOAD)) / (2 * h)
-    assert slope == pytest.approx([stiffness(tyre, LOAD)], rel=1e-6)
+    assert slope == pytest.approx(stiffness(tyre, LOAD), rel=1e-6)
     assert stiffness(tyre, LOAD) == pytest.approx(tyre.B * tyre.C * tyre.mu * LOAD)
 
 

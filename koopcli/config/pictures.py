@@ -1,0 +1,72 @@
+"""What figures there are, and what they are told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from koopcli.checks import setting
+from koopcli.vehicles.parameters import MagicFormula
+
+FigureName = Literal[
+    "single-track",
+    "tyre",
+    "trajectory",
+    "orders",
+    "best-order",
+    "random-input",
+    "energy-surface",
+    "error-map",
+    "error-side",
+    "mean-trajectory",
+    "rmse-histogram",
+    "horizon",
+    "compare",
+    "density",
+    "before-after",
+    "modes",
+    "frontier",
+    "trust",
+    "spectrum",
+]
+ImageFormat = Literal["png", "svg", "pdf"]
+
+
+@dataclass(frozen=True)
+class Series:
+    """What one of several artefacts is called in a figure, and where it stands on the axis that it is drawn against."""
+
+    label: str
+    at: float | None = None
+
+
+@dataclass(frozen=True)
+class Tyres:
+    """What a figure draws of a vehicle's tyres: ``loads`` in N and formulas of a front and of a rear wheel."""
+
+    label: str
+    loads: tuple[float, ...]
+    mu_scale: float
+    lateral: tuple[MagicFormula, ...]
+    longitudinal: tuple[MagicFormula, ...]
+
+
+@dataclass(frozen=True)
+class PlotOptions:
+    """What figures can be told."""
+
+    restart: int = setting(50, low=1, high=1_000_000, help="random-input: steps until the prediction starts afresh")
+    trajectory: int = setting(0, low=0, high=100_000_000, help="trajectory: which one is drawn, counted from 0")
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure, what it is told beside its inputs, and the digest of the code that draws it."""
+
+    figure: FigureName
+    format: ImageFormat
+    drawn_by: str
+    series: tuple[Series, ...] = setting((), empty=True)
+    tyres: tuple[Tyres, ...] = setting((), empty=True)
+    restart: int | None = None
+    trajectory: int | None = None

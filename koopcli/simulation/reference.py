@@ -1,0 +1,58 @@
+"""Integration by a solver that controls its error, one trajectory at a time: to compare with, slow."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from koopcli.progress import Progress, silent
+from koopcli.records import Course, FloatArray, Trajectories
+from koopcli.simulation.integrate import LARGEST, LOST, Rhs
+
+RELATIVE, ABSOLUTE = 1e-10, 1e-12  # tolerances
+FAILED = 3  # place in ENDS
+
+
+def reference(
+    rhs: Rhs, x0: FloatArray, u: FloatArray, dt: float, progress: Progress = silent
+) -> tuple[FloatArray, Course]:
+    """What :func:`koopcli.simulation.integrate.integrate` approximates, by LSODA, which changes between a method for
+    stiff and one for other equations; it starts afresh at every sample, where inputs jump.
+
+    Shapes as there. ``progress(done, total)`` counts samples.
+    """
+    n, steps = u.shape[:2]
+    x = np.full((n, steps + 1, x0.shape[1]), np.nan)
+    x[:, 0] = x0
+    course = Course(np.full(n, steps), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64))
+    for i in range(n):
+        for k in range(steps):
+            after, failed = _sample(rhs, x[i, k], u[i, k], dt)
+            if failed:
+                course.steps[i], course.reason[i] = k, failed
+                break
+            x[i, k + 1] = after
+        progress((i + 1) * steps, n * steps)
+    return x, course
+
+
+def difference(usual: Trajectories, other: Trajectories) -> list[tuple[str, str, float, float]]:
+    """How far two simulations of one sample are apart, where both have states: name and unit of each state, the
+    largest absolute difference and the root of the mean square.
+    """
+    apart = np.asarray(usual.x[:]) - np.asarray(other.x[:])
+    apart = apart[np.isfinite(apart).all(axis=2)]
+    largest, root = np.abs(apart).max(axis=0), np.sqrt((apart**2).mean(axis=0))
+    channels = usual.state_channels
+    return list(zip(channels.names, channels.units, largest.tolist(), root.tolist(), strict=True))
+
+
+def _sample(rhs: Rhs, x: FloatArray, u: FloatArray, dt: float) -> tuple[FloatArray, int]:
+    """The state one sample later, and why there is none."""
+    if not (np.abs(x) <= LARGEST).all():
+        return x, LOST
+    found = solve_ivp(lambda t, y: rhs(y, u), (0.0, dt), x, method="LSODA", rtol=RELATIVE, atol=ABSOLUTE)
+    after: FloatArray = found.y[:, -1]
+    if not found.success:
+        return after, FAILED
+    return after, 0 if (np.abs(after) <= LARGEST).all() else LOST
