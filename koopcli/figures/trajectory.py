@@ -17,7 +17,7 @@ from koopcli.figures.style import COLUMN, axis_label, looks, style
 from koopcli.records import ENDS, Array, Channels, FloatArray, Trajectories
 
 RIM = {"wheel_rate_f": "front", "wheel_rate_r": "rear"}
-HEADINGS, LENGTH = 12, 0.05  # cars drawn along the path; of the path's size
+HEADINGS = 12  # cars drawn along the path
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def draw(shown: Path) -> Figure:
     units = list(dict.fromkeys(shown.input_channels.units))
     rows = 5 + len(units)
     with style():
-        figure = Figure(figsize=(COLUMN, 1.6 + 0.95 * (rows - 1)), layout="constrained")
+        figure = Figure(figsize=(COLUMN, 1.5 + 0.8 * (rows - 1)), layout="constrained")
         panels = figure.subplots(rows, height_ratios=[1.6, *([1] * (rows - 1))])
         _draw_path(panels[0], shown)
         speed, across, yaw, side, *inputs = panels[1:]
@@ -108,8 +108,8 @@ def draw(shown: Path) -> Figure:
             axes.plot(shown.time, shown.x[:, i], color=COLOURS[0])
         side.plot(shown.time, shown.lateral, color=COLOURS[0])
         for i, axes in enumerate((speed, across, yaw)):
-            axes.set_ylabel(axis_label(shown.state_channels.names[i], shown.state_channels.units[i]))
-        side.set_ylabel("$a_{y}$ (m/s²)")
+            axes.set_ylabel(_two_lines(shown.state_channels.names[i], shown.state_channels.units[i]))
+        side.set_ylabel(_two_lines("a_y", "m/s²"))
         for axes, unit in zip(inputs, units, strict=True):
             _draw_inputs(axes, shown, unit)
         for axes in (speed, *inputs):
@@ -124,12 +124,11 @@ def draw(shown: Path) -> Figure:
 
 def _draw_path(axes: Axes, shown: Path) -> None:
     X, Y, heading = shown.ground.T
-    size = LENGTH * max(np.ptp(X), np.ptp(Y), 1.0)
     axes.plot(X, Y, color=COLOURS[0])
     for k in np.unique(np.linspace(0, len(X) - 1, HEADINGS).astype(int)):
-        nose = (X[k] + size * np.cos(heading[k]), Y[k] + size * np.sin(heading[k]))
-        axes.annotate("", nose, (X[k], Y[k]), arrowprops={"arrowstyle": "-|>", "color": COLOURS[1], "lw": 0.8})
-    axes.plot(X[0], Y[0], "o", color=GUIDE)
+        nose = (3, 0, np.rad2deg(heading[k]) - 90)  # a triangle that points ahead
+        axes.plot(X[k], Y[k], marker=nose, color=COLOURS[1], markersize=5)
+    axes.plot(X[0], Y[0], "o", color=GUIDE, markersize=2.5)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("X (m)")
     axes.set_ylabel("Y (m)")
@@ -145,6 +144,11 @@ def _draw_inputs(axes: Axes, shown: Path, unit: str) -> None:
     for (name, values), look in zip(moving, looks(len(moving)), strict=True):
         axes.step(shown.time, np.append(values, values[-1]), where="post", label=name.replace("_", " "), **look)
     if len(moving) == 1:
-        axes.set_ylabel(axis_label(moving[0][0].replace("_", " "), unit))
+        axes.set_ylabel(_two_lines(moving[0][0], unit))
     else:
-        axes.set_ylabel(f"input ({unit})")
+        axes.set_ylabel(_two_lines("input", unit))
+
+
+def _two_lines(name: str, unit: str) -> str:
+    """A label that is no longer than a low panel."""
+    return axis_label(name, unit).replace(" (", "\n(")

@@ -11,6 +11,7 @@ from koopcli.simulation.integrate import LARGEST, LOST, Rhs
 
 RELATIVE, ABSOLUTE = 1e-10, 1e-12  # tolerances
 FAILED = 3  # place in ENDS
+MOST_CALLS = 200_000  # of the right-hand side for one sample
 
 
 def reference(
@@ -47,11 +48,28 @@ def difference(usual: Trajectories, other: Trajectories) -> list[tuple[str, str,
     return list(zip(channels.names, channels.units, largest.tolist(), root.tolist(), strict=True))
 
 
+class _Stuck(Exception):
+    """The solver makes no headway, as where a solution reaches infinity: it would go on for ever."""
+
+
 def _sample(rhs: Rhs, x: FloatArray, u: FloatArray, dt: float) -> tuple[FloatArray, int]:
     """The state one sample later, and why there is none."""
     if not (np.abs(x) <= LARGEST).all():
         return x, LOST
-    found = solve_ivp(lambda t, y: rhs(y, u), (0.0, dt), x, method="LSODA", rtol=RELATIVE, atol=ABSOLUTE)
+    calls = 0
+
+    def counted(t: float, y: FloatArray) -> FloatArray:
+        nonlocal calls
+        calls += 1
+        if calls > MOST_CALLS:
+            raise _Stuck
+        return rhs(y, u)
+
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # of one that ends for it
+            found = solve_ivp(counted, (0.0, dt), x, method="LSODA", rtol=RELATIVE, atol=ABSOLUTE)
+    except _Stuck:
+        return x, FAILED
     after: FloatArray = found.y[:, -1]
     if not found.success:
         return after, FAILED

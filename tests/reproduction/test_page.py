@@ -42,8 +42,9 @@ def test_the_report_of_both_methods(koop, folder):
 
     assert {figure["figure"] for figure in text.figures} == set(FIGURES) - {
         "best-order",
+        "trajectory",
         *OF_BEYOND,
-    }  # all but that of --full
+    }  # all but that of --full, and what is drawn of single simulations
     assert [figure["figure"] for figure in text.figures] == [one["figure"] for one in found["figures"]]
     for figure, one in zip(text.figures, found["figures"], strict=True):
         assert figure["command"] == one["command"]
