@@ -48,7 +48,7 @@ def difference(usual: Trajectories, other: Trajectories) -> list[tuple[str, str,
     return list(zip(channels.names, channels.units, largest.tolist(), root.tolist(), strict=True))
 
 
-class _Stuck(Exception):
+class _StuckError(Exception):
     """The solver makes no headway, as where a solution reaches infinity: it would go on for ever."""
 
 
@@ -62,13 +62,13 @@ def _sample(rhs: Rhs, x: FloatArray, u: FloatArray, dt: float) -> tuple[FloatArr
         nonlocal calls
         calls += 1
         if calls > MOST_CALLS:
-            raise _Stuck
+            raise _StuckError
         return rhs(y, u)
 
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # of one that ends for it
             found = solve_ivp(counted, (0.0, dt), x, method="LSODA", rtol=RELATIVE, atol=ABSOLUTE)
-    except _Stuck:
+    except _StuckError:
         return x, FAILED
     after: FloatArray = found.y[:, -1]
     if not found.success:
