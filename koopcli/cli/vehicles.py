@@ -115,7 +115,7 @@ def _shown(name: str, value: float) -> str:
     """A derived number; zero and infinity have names of their own."""
     if name == "understeer gradient" and value == 0:
         return "0 (neutral)"
-    return "none" if math.isinf(value) else f"{value:.5g}"
+    return "none" if not math.isfinite(value) else f"{value:.5g}"
 
 
 def _parameters(table: Any, prefix: str = "") -> list[list[str]]:

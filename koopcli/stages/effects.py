@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from koopcli.config.driving import MAGNITUDES
 from koopcli.config.experiment import Experiment
 from koopcli.config.plants import UNUSED
-from koopcli.config.samples import OF_VEHICLE, SAMPLED_FOR, GreedySample
+from koopcli.config.samples import OF_VEHICLE, SAMPLED_FOR
 from koopcli.stages.base import Task
 
 
@@ -52,16 +52,13 @@ def _idle_sample(section: str, key: str, tasks: Sequence[Task], behind: Sequence
 def _idle_in_plants(name: str, key: str, tasks: Sequence[Task], behind: Sequence[Task]) -> str | None:
     """Of a setting of the vehicle or of its simulation."""
     plants = {step.settings.plant for step in behind if step.stage == "simulate"}
-    plants |= {SAMPLED_FOR[step.settings.kind] for step in behind if isinstance(step.settings, GreedySample)}
-    by_energy = any(
-        key in (*OF_VEHICLE, "name") and hasattr(step.settings, OF_VEHICLE[0])
-        for step in behind
-        if step.stage == "sample"
-    )
-    if not plants and not by_energy:
+    samples = [step.settings for step in behind if step.stage == "sample"]
+    plants |= {SAMPLED_FOR[one.kind] for one in samples if hasattr(one, "vehicle")}
+    own = OF_VEHICLE if key == "name" else (key,) if key in OF_VEHICLE else ()
+    if not plants and not any(hasattr(one, name) for one in samples for name in own):
         if tasks and tasks[0].stage == "plot":
             return _of_nothing(tasks)
-        return "only kinds of sample by kinetic energy depend on the vehicle, through its m and Jzz"
+        return "only samples by kinetic energy depend on the vehicle, through its m and Jzz, and those on wheels (r_w)"
     unused = [plant for plant in plants if any(f"{name}.".startswith(f"{one}.") for one in UNUSED[plant])]
     return f"the plant '{unused[0]}' has no use for it" if plants and len(unused) == len(plants) else None
 

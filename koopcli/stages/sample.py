@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -26,6 +27,7 @@ from koopcli.simulation import designs, sampling
 from koopcli.simulation.integrate import simulate
 from koopcli.simulation.manoeuvres import MANOEUVRES, Driver
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
+from koopcli.vehicles.handling import understeer_gradient
 from koopcli.vehicles.plants import PLANTS
 from koopcli.vehicles.single_track import SlipInput, TorqueInput
 from koopcli.vehicles.symmetry import images
@@ -116,6 +118,10 @@ def _check(task: Task) -> None:
         _check_drive(s)
     if isinstance(s, ManoeuvreSample):
         TorqueInput(s.vehicle)
+        if not math.isfinite(understeer_gradient(s.vehicle)):
+            raise InvalidValueError(
+                "no steer turns a car without grip: raise vehicle.mu_scale or lateral.mu above 0"
+            )
     refuse_beyond_memory("the sample", _estimate(task).bytes, "sample.count")
 
 

@@ -33,10 +33,11 @@ def cornering_stiffness(p: VehicleParameters) -> tuple[float, float]:
 def understeer_gradient(p: VehicleParameters) -> float:
     """How much more steer a steady turn takes for each m/s² of lateral acceleration, in rad s²/m, (9.2).
 
-    Positive: the car understeers; zero, and exactly so where both axles have one tyre: neutral.
+    Positive: the car understeers; zero, and exactly so where both axles have one tyre: neutral; without grip there is
+    none.
     """
     front, rear = cornering_stiffness(p)
-    if p.mu_scale == 0:
+    if front == 0 or rear == 0:
         return math.nan
     gradient = p.m / (p.l_f + p.l_r) * (p.l_r / front - p.l_f / rear)
     return gradient if abs(gradient) > NEUTRAL else 0.0

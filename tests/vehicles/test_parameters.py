@@ -60,3 +60,18 @@ def test_single_parameters_change(vehicle):
     assert change(vehicle, {"Jzz": 1731}, COMMAND_LINE).Jzz == 1731.0
     with pytest.raises(InvalidValueError, match=r"'vehicle\.m' must be above 0"):
         change(vehicle, {"m": -1.0}, COMMAND_LINE)
+
+
+def test_the_documented_schema_is_the_one_that_is_checked():
+    from dataclasses import fields
+    from pathlib import Path
+
+    from koopcli.vehicles.parameters import TYRES, MagicFormula, VehicleParameters
+
+    text = (Path(__file__).parents[2] / "docs" / "vehicles.md").read_text()
+    body = [("parameters", f) for f in fields(VehicleParameters) if f.name not in TYRES]
+    for table, f in (*body, *(("lateral", f) for f in fields(MagicFormula))):
+        row = next(line for line in text.splitlines() if line.startswith(f"| {table}.{f.name} |"))
+        assert f"| {f.metadata['unit']} |" in row
+        assert f.metadata["help"] in row
+    assert all(f"[{name}]" in text for name in TYRES)
