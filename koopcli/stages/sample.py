@@ -119,9 +119,7 @@ def _check(task: Task) -> None:
     if isinstance(s, ManoeuvreSample):
         TorqueInput(s.vehicle)
         if not math.isfinite(understeer_gradient(s.vehicle)):
-            raise InvalidValueError(
-                "no steer turns a car without grip: raise vehicle.mu_scale or lateral.mu above 0"
-            )
+            raise InvalidValueError("no steer turns a car without grip: raise vehicle.mu_scale or lateral.mu above 0")
     refuse_beyond_memory("the sample", _estimate(task).bytes, "sample.count")
 
 

@@ -57,7 +57,7 @@ def one_line(result, code, *parts):
         (["simulate", "--set", "sample.count=2000"], 3, "the trajectories would need"),
         (["evaluate", "--vehicle", "x"], 2, "--vehicle"),
         (["sample", "--set", "vehicle.Jzz=5"], 2, "vehicle.Jzz changes nothing here: only samples by kinetic"),
-        (["sample", "ball", "--set", "vehicle.rho=5"], 2, "vehicle.rho changes nothing here: only kinds of sample"),
+        (["sample", "ball", "--set", "vehicle.rho=5"], 2, "vehicle.rho changes nothing here: only samples by kinetic"),
         (["fit-edmd", "--set", "vehicle.mu_scale=2"], 2, "the plant 'forces' has no use for it"),
         (["evaluate", "--excitation", "none", "--amplitude", "5"], 2, "the excitation 'none' has no use for it"),
         (["fit-edmd", "--set", "vehicle.lateral.mu=2"], 2, "the plant 'forces' has no use for it"),

@@ -168,7 +168,7 @@ def test_energy_of_body_and_wheels_never_grows(plant, states, kind):
     """Without torque and steer, forwards and in reverse, whatever the wheels do at first."""
     x0 = rolling(plant, *np.linspace(-30, 30, 41)) if kind == "rolling" else states
     x0 = x0 + np.array([0, 0.5, 0.2, 0, 0])
-    energy = plant.kinetic_energy(run(plant, x0, np.zeros(6), 0.5))
+    energy = plant.kinetic_energy(run(plant, x0[::3], np.zeros(6), 0.3))
     assert (np.diff(energy, axis=1) <= 1e-9 * energy[:, :1]).all()
     assert (energy[:, -1] < energy[:, 0]).all()
 
@@ -227,11 +227,12 @@ def test_a_steady_turn_is_that_of_the_linear_car(plant, odd):
         ([0, 0, 0, 200, -200], [0, 0, 0, 0, 0, 0]),  # wheels against one another
     ],
 )
-def test_rough_treatment_stays_finite(plant, x0, u):
-    x = run(plant, np.array(x0, float), np.array(u, float), 3.0)
+def test_rough_treatment_stays_finite(x0, u):
+    plant = TorqueInput(vehicle_named("rimac-2018"))
+    x = run(plant, np.array(x0, float), np.array(u, float), 1.0)
     assert np.isfinite(x).all()
     assert np.abs(x[..., :2]).max() < 100
-    finer = run(plant, np.array(x0, float), np.array(u, float), 0.3, finer=4)
+    finer = run(plant, np.array(x0, float), np.array(u, float), 0.3, finer=2)
     assert np.abs(x[0, 30, :3] - finer[0, -1, :3]).max() < 5e-3
 
 
