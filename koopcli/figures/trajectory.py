@@ -119,6 +119,10 @@ def draw(shown: Path) -> Figure:
             axes.tick_params(labelbottom=False)
         panels[-1].set_xlabel("time (s)")
         figure.align_ylabels(panels[1:])
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # the solver's last digits move from run to run with so many panels
+        for axes in panels:
+            axes.set_position(np.round(axes.get_position(original=True).bounds, 5))
     return figure
 
 
