@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from koopcli.stages.pipeline import content_of
+from koopcli.stages.recorded import content_of
 from koopcli.store import Store, store_root
 
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from koopcli.errors import DamagedArtefactError, InvalidValueError, NewerFormatError, UnknownNameError, UsageError
+from koopcli.errors import DamagedArtefactError, UnknownNameError
 from koopcli.records import Packed
 from koopcli.stages.base import Context, Cost, Reporter, Stage, Task
+from koopcli.stages.recorded import content_of, recipe_of, settings_of
 from koopcli.stages.registry import STAGES
 from koopcli.store import Record, Store
-from koopcli.store.identity import SCHEMA, key_of, plain
+from koopcli.store.identity import key_of
 from koopcli.store.provenance import provenance
 from koopcli.store.records import SHORT
 
@@ -130,7 +131,7 @@ class Pipeline:
             if record is None:
                 return None
             inputs[role] = record
-        found = self.store.record(task.stage, key_of(_recipe(task, inputs)))
+        found = self.store.record(task.stage, key_of(recipe_of(task, inputs)))
         if found is not None:
             self._records[task] = found
         return found
@@ -162,7 +163,7 @@ class Pipeline:
         """Make ``task`` under its lock, unless another process has just done so."""
         stage = STAGES[task.stage]
         inputs = {role: self._obtain(upstream)[:2] for role, upstream in task.inputs}
-        recipe = _recipe(task, {role: record for role, (record, _) in inputs.items()})
+        recipe = recipe_of(task, {role: record for role, (record, _) in inputs.items()})
         key = key_of(recipe)
         if task.key not in (None, key):
             raise DamagedArtefactError(
@@ -198,7 +199,7 @@ class Pipeline:
         inputs = {role: self._known(upstream) for role, upstream in task.inputs}
         known = {role: found for role, found in inputs.items() if found is not None}
         complete = record is not None and set(known) == set(record.lineage)
-        if not complete or key_of(_recipe(task, known)) != task.key:
+        if not complete or key_of(recipe_of(task, known)) != task.key:
             raise DamagedArtefactError(
                 f"{task.name} is damaged and cannot be made again, because its inputs are "
                 "gone or another version made it: run its command afresh"
@@ -232,44 +233,3 @@ class _Chunks:
                     self.parts.commit(i, results[i])
             self.progress(rows.stop, count)
         return results
-
-
-def stage_of(record: Record) -> Stage:
-    """The stage that made ``record``. Raises ``NewerFormatError`` for one that this version does not have."""
-    if record.stage not in STAGES:
-        raise NewerFormatError(f"{record.name} is of a stage that this koop does not have: update koop")
-    return STAGES[record.stage]
-
-
-def content_of(record: Record, store: Store) -> Any:
-    """The verified content. Raises ``DamagedArtefactError`` when it is damaged or laid out by another version."""
-    packed = store.read(record)
-    try:
-        return stage_of(record).unpack(packed)
-    except (KeyError, TypeError, ValueError) as error:
-        raise DamagedArtefactError(f"{record.name} {_other_version(record)}") from error
-
-
-def settings_of(record: Record) -> Any:
-    """The settings in ``record``. Raises ``NewerFormatError`` when this version does not know them."""
-    try:
-        return stage_of(record).settings(record.recipe["settings"])
-    except (UsageError, InvalidValueError, KeyError, TypeError) as error:
-        raise NewerFormatError(f"{record.name} {_other_version(record)} ({error})") from error
-
-
-def _other_version(record: Record) -> str:
-    written, here = record.recipe["version"], STAGES[record.stage].version
-    return (
-        f"was written by another koop (version {written} of its stage, here {here}): make it afresh or change versions"
-    )
-
-
-def _recipe(task: Task, inputs: Mapping[str, Record]) -> dict[str, Any]:
-    return {
-        "schema": SCHEMA,
-        "stage": task.stage,
-        "version": STAGES[task.stage].version,
-        "settings": plain(task.settings),
-        "inputs": {role: record.data for role, record in inputs.items()},
-    }

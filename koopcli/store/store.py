@@ -6,21 +6,16 @@ refs/ (pins)   locks/   tmp/   quarantine/
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from filelock import FileLock, Timeout
-
 from koopcli.errors import (
     DamagedArtefactError,
-    InvalidValueError,
-    LockTimeoutError,
     StorageError,
     UnknownNameError,
 )
@@ -28,10 +23,10 @@ from koopcli.records import Packed
 from koopcli.store import image
 from koopcli.store.files import publish, reading_errors, sha256_file, storage_errors, sweep
 from koopcli.store.identity import data_digest
+from koopcli.store.locks import hold
+from koopcli.store.parts import Parts
 from koopcli.store.records import SHORT, BadRecordError, Record
 
-LOCK_TIMEOUT = "KOOP_LOCK_TIMEOUT"
-WITHOUT_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL)
 KEY = re.compile(r"([0-9a-f]{64})\.json")
 CANDIDATES = 8
 
@@ -144,30 +139,13 @@ class Store:
             self._publish(self._record_path(record.stage, record.key), record.to_json())
         return record
 
-    @contextmanager
-    def lock(self, key: str, name: str) -> Iterator[None]:
-        """Hold the lock of ``key`` while making it. Correctness never rests on it: without locks, warn and go on."""
-        lock = FileLock(self.root / "locks" / f"{key}.lock")
-        with storage_errors(self.root):
-            (self.root / "locks").mkdir(parents=True, exist_ok=True)
-        try:
-            lock.acquire(timeout=0)
-        except Timeout:
-            self.warn(f"waiting for another process that is making {name}")
-            self._wait(lock, name)
-        except (NotImplementedError, OSError) as error:
-            if isinstance(error, OSError) and error.errno not in WITHOUT_LOCKS:
-                with storage_errors(self.root):
-                    raise
-            self.warn("this file system has no locks: two processes may make the same artefact twice")
-        try:
-            yield
-        finally:
-            lock.release()
+    def lock(self, key: str, name: str) -> AbstractContextManager[None]:
+        """Hold the lock of ``key`` for the time of a ``with``; see :func:`koopcli.store.locks.hold`."""
+        return hold(self.root / "locks" / f"{key}.lock", name, self.warn)
 
     def parts(self, key: str) -> Parts:
         """The committed chunks of an unfinished artefact."""
-        return Parts(self, key)
+        return Parts(self.root / "partial" / key, self._put)
 
     def _put(self, packed: Packed, target: Callable[[str], Path]) -> Path:
         """Write the image of ``packed`` to ``target(sha256)``, through memory unless it is large."""
@@ -196,19 +174,6 @@ class Store:
                 if record is not None and self.has_object(record):  # without its object it is being made again
                     self.parts(folder.name).clear()
 
-    def _wait(self, lock: FileLock, name: str) -> None:
-        text = os.environ.get(LOCK_TIMEOUT, "3600")
-        try:
-            seconds = float(text)
-        except ValueError as error:
-            raise InvalidValueError(f"{LOCK_TIMEOUT} must be a number of seconds, got {text!r}") from error
-        try:
-            lock.acquire(timeout=seconds)
-        except Timeout as error:
-            raise LockTimeoutError(
-                f"another process has been making {name} for over {seconds:g} s: wait for it, or raise {LOCK_TIMEOUT}"
-            ) from error
-
     def _object_path(self, digest: str) -> Path:
         return self.root / "objects" / digest[:2] / f"{digest}.h5"
 
@@ -225,32 +190,3 @@ class Store:
         except OSError:
             return "and cannot be put aside in a read-only store"
         return "and was put aside"
-
-
-class Parts:
-    """Chunks of an unfinished artefact, each committed by itself and named by number and digest."""
-
-    def __init__(self, store: Store, key: str) -> None:
-        self._store = store
-        self._folder = store.root / "partial" / key
-
-    def read(self, i: int) -> Packed | None:
-        """Chunk ``i``, verified, or None."""
-        with storage_errors(self._folder):
-            for path in sorted(self._folder.glob(f"{i}-*.h5")):
-                content = path.read_bytes()
-                if hashlib.sha256(content).hexdigest() == path.stem.partition("-")[2]:
-                    return image.from_bytes(content)
-                path.unlink()
-        return None
-
-    def commit(self, i: int, packed: Packed) -> None:
-        """Store chunk ``i``."""
-        self._store._put(packed, lambda sha: self._folder / f"{i}-{sha}.h5")
-
-    def clear(self) -> None:
-        """Remove the chunks: the finished artefact holds them."""
-        with suppress(OSError):
-            for path in self._folder.iterdir():
-                path.unlink()
-            self._folder.rmdir()

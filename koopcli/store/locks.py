@@ -1,0 +1,56 @@
+"""Locks: one process makes an artefact while others wait for it. Correctness never rests on them."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from koopcli.errors import InvalidValueError, LockTimeoutError
+from koopcli.store.files import storage_errors
+
+LOCK_TIMEOUT = "KOOP_LOCK_TIMEOUT"
+WITHOUT_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL)
+
+
+@contextmanager
+def hold(path: Path, name: str, warn: Callable[[str], None]) -> Iterator[None]:
+    """Hold the lock at ``path`` while making ``name``. On a file system without locks, warn and go on.
+
+    Raises ``LockTimeoutError`` where another process holds it for longer than ``$KOOP_LOCK_TIMEOUT`` seconds.
+    """
+    lock = FileLock(path)
+    with storage_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        warn(f"waiting for another process that is making {name}")
+        _wait(lock, name)
+    except (NotImplementedError, OSError) as error:
+        if isinstance(error, OSError) and error.errno not in WITHOUT_LOCKS:
+            with storage_errors(path):
+                raise
+        warn("this file system has no locks: two processes may make the same artefact twice")
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def _wait(lock: FileLock, name: str) -> None:
+    text = os.environ.get(LOCK_TIMEOUT, "3600")
+    try:
+        seconds = float(text)
+    except ValueError as error:
+        raise InvalidValueError(f"{LOCK_TIMEOUT} must be a number of seconds, got {text!r}") from error
+    try:
+        lock.acquire(timeout=seconds)
+    except Timeout as error:
+        raise LockTimeoutError(
+            f"another process has been making {name} for over {seconds:g} s: wait for it, or raise {LOCK_TIMEOUT}"
+        ) from error
