@@ -11,6 +11,7 @@ from koopcli.interrupts import TERMINATED, interruptible
 
 RESUME = "interrupted: nothing committed is lost; run the same command again to resume"
 INTERRUPTED = 130
+BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -18,6 +19,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         with interruptible():
             _streams()
+            for name in BLAS_THREADS:  # read when numpy is first imported, here and in workers
+                os.environ.setdefault(name, "1")
             code = _run(argv)
             sys.stdout.flush()
     except KoopError as error:

@@ -3,33 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from koopcli.blocks import Blocks, Chosen, Joined
 from koopcli.errors import InvalidValueError
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
 Meta = dict[str, Any]  # what JSON can hold
-
-
-class Blocks(Protocol):
-    """An array in memory or on disk that is read by slices of its first axis."""
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """The lengths of the axes."""
-
-    @property
-    def dtype(self) -> Any:
-        """The numpy type."""
-
-    def __getitem__(self, rows: Any, /) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -107,19 +94,27 @@ class Sample:
         """(states, input rows) if every state meets every input row."""
         return (self.starts, len(self.inputs)) if self.crossed else None
 
-    def expand(self, steps: int) -> tuple[FloatArray, FloatArray]:
-        """Initial states (n, n_x) and inputs (n, steps, n_u) of each trajectory, state-major when crossed."""
+    @property
+    def trajectories(self) -> int:
+        """Number of trajectories."""
+        return self.starts * len(self.inputs) if self.crossed else self.starts
+
+    def expand(self, steps: int, rows: slice = slice(None)) -> tuple[FloatArray, FloatArray]:
+        """Initial states (n, n_x) and inputs (n, steps, n_u) of each trajectory, state-major when crossed.
+
+        ``rows``: of these trajectories only.
+        """
         x0, u = self.x0, self.inputs
-        if u.shape[1] == 1:
-            u = np.repeat(u, steps, axis=1)
-        elif u.shape[1] < steps:
+        if 1 < u.shape[1] < steps:
             raise InvalidValueError(
                 f"the sample holds inputs for {u.shape[1]} steps, {steps} were asked for: sample again with more"
             )
-        u = u[:, :steps]
         if self.crossed:
-            return np.repeat(x0, len(u), axis=0), np.tile(u, (len(x0), 1, 1))
-        return x0, u
+            chosen = np.arange(*rows.indices(self.trajectories))
+            x0, u = x0[chosen // len(u)], u[chosen % len(u)]
+        else:
+            x0, u = x0[rows], u[rows]
+        return x0, np.repeat(u, steps, axis=1) if u.shape[1] == 1 else u[:, :steps]
 
     def pack(self) -> Packed:
         """The sample for storage; a grid is stored by its factors."""
@@ -231,7 +226,7 @@ class Trajectories:
             return self
         kept = self.course.finished
         course = Course(*(getattr(self.course, f.name)[kept] for f in fields(Course)))
-        return replace(self, x=self.x[:][kept], u=self.u[:][kept], product=None, course=course)
+        return replace(self, x=_rows(self.x, kept), u=_rows(self.u, kept), product=None, course=course)
 
     @property
     def factors(self) -> tuple[int, int] | None:
@@ -278,3 +273,17 @@ class Trajectories:
             plant=packed.meta["plant"],
             course=Course.unpack(packed.arrays),
         )
+
+
+def _rows(values: Blocks, kept: BoolArray) -> Blocks:
+    """The rows of ``values`` that are ``kept``; those on disk stay there."""
+    return values[kept] if isinstance(values, np.ndarray) else Chosen(values, np.flatnonzero(kept))
+
+
+def join(parts: Sequence[Trajectories]) -> Trajectories:
+    """One record from those of consecutive trajectories; what is on disk stays there."""
+    if len(parts) == 1:
+        return parts[0]
+    courses = [part.course for part in parts if part.course is not None]
+    course = Course(*(np.concatenate([getattr(one, f.name) for one in courses]) for f in fields(Course)))
+    return replace(parts[0], x=Joined([p.x for p in parts]), u=Joined([p.u for p in parts]), course=course)

@@ -16,6 +16,7 @@ from koopcli.cli.options import (
     JsonOption,
     SetOption,
     StoreOption,
+    WorkersOption,
     complete_name,
     names,
 )
@@ -73,6 +74,7 @@ def evaluate(
             "predictor driven by forces the test set is then the paper's trajectory under random inputs (kind point)."
         ),
     ] = None,
+    workers: WorkersOption = 1,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
@@ -90,7 +92,7 @@ def evaluate(
     """
     given: Values = {"excitation": excitation, "amplitude": amplitude, "count": count, "steps": steps, "seed": seed}
     changes: Changes = {"test": given, "evaluate": {"restart": restart}}
-    call = begin(store, experiment, set_, (*fitting.DATA, "fit-edmd", *TEST), changes)
+    call = begin(store, experiment, set_, (*fitting.DATA, "fit-edmd", *TEST), changes, workers)
     from koopcli.stages import recipes
     from koopcli.stages.verdict import beside
 
@@ -118,7 +120,7 @@ def _judge(call: Invocation, artefact: Artefact, others: dict[str, Task]) -> dic
     if not others:
         call.console.note("no baselines beside it: the data that this predictor was fitted to are no longer there")
         return {}
-    quiet = Pipeline(call.pipeline.store, _Unwarned(call.console))
+    quiet = Pipeline(call.pipeline.store, _Unwarned(call.console), call.pipeline.workers)
     made = {name: quiet.make(task) for name, task in others.items()}
     rows = [["this predictor", *_scores(artefact.figures)]]
     rows += [[NAMES[name], *_scores(one.figures)] for name, one in made.items()]

@@ -84,8 +84,9 @@ class Invocation:
         for one in also:
             self.pipeline.check(one)
         self.console.note(f"store: {self.pipeline.store.root}")
-        artefact = self.pipeline.make(task)
-        more = extra(artefact) if extra is not None else None
+        with self.pipeline.workers:
+            artefact = self.pipeline.make(task)
+            more = extra(artefact) if extra is not None else None
         if as_json:
             print_json({**describe(artefact, self.pipeline.store.path(artefact.record)), **(more or {})})
         else:
@@ -98,13 +99,17 @@ def begin(
     assignments: Sequence[str] | None,
     sections: Sequence[str],
     options: Changes | None = None,
+    workers: int = 1,
 ) -> Invocation:
     """What a command works with; its ``options`` win over ``--set``, which wins over the experiment file.
 
-    ``sections``: those whose settings the command uses; ``--set`` of any other is refused.
+    ``sections``: those whose settings the command uses; ``--set`` of any other is refused. ``workers``: how many
+    processes share the work.
     """
     from koopcli.stages.pipeline import Pipeline
+    from koopcli.stages.workers import Workers
 
+    sharing = Workers(workers)
     changes = parse_set(assignments or [])
     for section, values in (options or {}).items():
         changes.setdefault(section, {}).update({key: v for key, v in values.items() if v is not None})
@@ -114,7 +119,7 @@ def begin(
             raise UsageError(f"--set {name} changes nothing here; this command uses {', '.join(sections)}")
     loaded = load_experiment(experiment, changes)
     console, shelf = open_store(store)
-    return Invocation(Pipeline(shelf, console), console, loaded, changes)
+    return Invocation(Pipeline(shelf, console, sharing), console, loaded, changes)
 
 
 def open_store(store: Path | None) -> tuple[Console, Any]:

@@ -17,6 +17,7 @@ from koopcli.cli.options import (
     SetOption,
     StoreOption,
     VehicleOption,
+    WorkersOption,
     complete_name,
     names,
 )
@@ -199,6 +200,7 @@ def simulate(
             help="Integrate by a solver that controls its error, slowly, and say how far the usual integration is off.",
         ),
     ] = None,
+    workers: WorkersOption = 1,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
@@ -220,7 +222,7 @@ def simulate(
         "combined": combined,
         "reference": reference,
     }
-    call = begin(store, experiment, set_, SIMULATE, {"simulate": given, "vehicle": {"name": vehicle}})
+    call = begin(store, experiment, set_, SIMULATE, {"simulate": given, "vehicle": {"name": vehicle}}, workers)
     from koopcli.stages import recipes
 
     of = call.named(sample, ["sample"], "the SAMPLE", ("simulate", "vehicle")) if sample else None

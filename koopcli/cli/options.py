@@ -40,6 +40,10 @@ SetOption = Annotated[
         "docs/cli.md lists them. May be repeated; the command's own options win.",
     ),
 ]
+WorkersOption = Annotated[
+    int,
+    typer.Option("--workers", metavar="N", help="Processes that share the work; they do not change a result."),
+]
 ExperimentOption = Annotated[
     str,
     typer.Option("--experiment", metavar="NAME|FILE", help="Where settings come from: paper, smoke or a TOML file."),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from koopcli.cli.invocation import Invocation, begin, print_json, show_plan
-from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption
+from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption, WorkersOption
 from koopcli.config.changes import SECTIONS, flat, nested
 from koopcli.config.experiment import load_experiment
 from koopcli.console import show_table
@@ -58,6 +58,7 @@ def reproduce(
             "buys (minutes more).",
         ),
     ] = False,
+    workers: WorkersOption = 1,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
@@ -77,10 +78,11 @@ def reproduce(
     if smoke and experiment != "paper":
         raise UsageError("--smoke is an experiment of its own: leave out --experiment")
     base = "smoke" if smoke else experiment
-    call = begin(store, base, set_, SECTIONS, {"reproduce": {"full": True if full else None}})
+    call = begin(store, base, set_, SECTIONS, {"reproduce": {"full": True if full else None}}, workers)
     from koopcli.reproduction import report
     from koopcli.reproduction.illustrations import illustrate
     from koopcli.reproduction.registry import BEYOND, METHODS
+    from koopcli.stages.ahead import make_ahead
 
     chosen = list(METHODS.values()) if method == "all" else [METHODS[method]]
     if beyond and method == "edmd":
@@ -93,12 +95,15 @@ def reproduce(
         steps = {step.task: step for tasks in wanted.values() for task in tasks for step in call.pipeline.plan(task)}
         show_plan(list(steps.values()), as_json=as_json)
         return
-    for task in (task for tasks in wanted.values() for task in tasks):
+    everything = [task for tasks in wanted.values() for task in tasks]
+    for task in everything:
         call.pipeline.check(task)
     parts = []
-    for one in chosen:
-        done = [report.run_cells(one, run, call.pipeline) for run in runs[one.name]]
-        parts.append(_Part(one, done, illustrate(one, done, call.pipeline)))
+    with call.pipeline.workers:
+        make_ahead(call.pipeline, everything)
+        for one in chosen:
+            done = [report.run_cells(one, run, call.pipeline) for run in runs[one.name]]
+            parts.append(_Part(one, done, illustrate(one, done, call.pipeline)))
     _finish(call, method, parts, as_json=as_json)
 
 

@@ -2,7 +2,8 @@
 
 The allowed names are literals, so that `koop --help` needs no numerics; a test holds them equal to the registries.
 A stage's settings are part of its key. Whatever does not change a result is not in here (the size of a chunk moves last
-bits), and ``settled`` gives a setting that another one switches off its default, so that it is not in the key either.
+bits of a score, and says which rows a committed part holds), and ``settled`` gives a setting that another one switches
+off its default, so that it is not in the key either.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ LiftName = Literal["nearest", "linear", "mls", "polyharmonic"]
 Coordinates = Literal["state", "world"]
 Scaling = Literal["raw", "extent"]
 BaselineKind = Literal["hold", "rotation", "linearisation"]
+CHUNKS = {"forces": 500_000, "slips": 50_000, "wheels": 20_000}  # samples that take some tenths of a second
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,13 @@ class Simulate:
     dt: float = setting(0.01, above=0, high=10, unit="s", help="sampling period")
     steps: int | None = setting(None, low=1, high=1_000_000, help="steps of each trajectory; else as the sample has")
     reference: bool = setting(False, help="integrate by a solver that controls its error, to compare with")
+    chunk: int | None = setting(
+        None,
+        low=1,
+        high=10**9,
+        help="samples for each committed part; else 500000 (forces), 50000 (slips) or 20000 (wheels), and a hundredth "
+        "of it for the reference",
+    )
 
     def settled(self) -> Simulate:
         """The same simulation with what is left open as its plant has it, and what it does not use at its default."""
@@ -61,7 +70,8 @@ class Simulate:
         own = {name.partition(".")[2] for name in UNUSED[plant] if name.startswith("simulate.")}
         idle = {name: getattr(Simulate, name) for name in own}
         open_ = {name: value for name, value in CUSTOMARY[plant].items() if getattr(self, name) is None}
-        return replace(self, vehicle=used_of(self.vehicle, plant), **{**idle, **open_})
+        chunk = CHUNKS[plant] if self.chunk is None else self.chunk
+        return replace(self, vehicle=used_of(self.vehicle, plant), chunk=chunk, **{**idle, **open_})
 
 
 @dataclass(frozen=True)

@@ -43,8 +43,8 @@ class Reporter(Protocol):
 class Chunks(Protocol):
     """Work in chunks, each committed as it is done; those already there are not computed again."""
 
-    def __call__(self, count: int, size: int, compute: Callable[[slice], Packed]) -> list[Packed]:
-        """The results of ``compute`` on consecutive slices of ``range(count)`` of length ``size``."""
+    def __call__(self, count: int, size: int) -> list[Packed]:
+        """The results of the stage's ``chunk`` on consecutive slices of ``range(count)`` of length ``size``."""
 
 
 @dataclass(frozen=True)
@@ -136,5 +136,7 @@ class Stage:
     """Refuse, before anything upstream is made, a task that cannot work."""
     estimate: Callable[[Task], Cost]
     """What making the task will cost, its inputs aside."""
+    chunk: Callable[[Any, Inputs, slice, Progress], Packed] | None = None
+    """Of a stage that asks for chunks: (settings, inputs, rows, progress) -> what one of them holds."""
     predicts: Callable[[Task], Prospect] | None = None
     """Of a stage that makes predictors: what a task's one will be."""

@@ -6,28 +6,25 @@ from typing import Any
 
 import numpy as np
 
+from koopcli.blocks import blocks
 from koopcli.checks import build
 from koopcli.config.settings import Evaluate
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.evaluation import Evaluation, evaluate, join, shortest_prediction
 from koopcli.koopman.predictor import check_horizon
+from koopcli.progress import Progress
 from koopcli.records import Meta, Packed
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
 from koopcli.stages.makers import prospect
 from koopcli.stages.usable import finished
 from koopcli.vehicles.plants import PLANTS
 
+SAMPLES = 500_000  # scored together, however long the trajectories of a chunk are
+
 
 def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
     predictor, trajectories = inputs["predictor"], finished(inputs["trajectories"], context)
-    assert settings.first is not None, "settled from the plant"
-    first = settings.first
-
-    def score(rows: slice) -> Packed:
-        return evaluate(predictor, trajectories, rows, first, settings.restart, settings.relift).pack()
-
-    parts = context.chunks(len(trajectories), settings.chunk, score)
-    result = join([Evaluation.unpack(part) for part in parts])
+    result = join([Evaluation.unpack(part) for part in context.chunks(len(trajectories), settings.chunk)])
     figures, n = result.figures(), len(result.diverged)
     for name, what in (
         ("diverged", "predictions diverged"),
@@ -36,12 +33,11 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
     ):
         if figures[name]:
             context.warn(f"{figures[name]} of {n} {what}; they are left out of the figures")
-    blocks = range(0, len(trajectories), settings.chunk)
     fitted = predictor.functions > 0  # nobody takes a baseline that knows no inputs for more than it is
     if (
         fitted
         and not predictor.knows_inputs
-        and any(np.asarray(trajectories.u[i : i + settings.chunk]).any() for i in blocks)
+        and any(np.asarray(trajectories.u[rows]).any() for rows in blocks(slice(0, len(trajectories)), settings.chunk))
     ):
         context.warn("the test trajectories have inputs, of which this predictor knows nothing")
     if other := _differing(predictor.plant, trajectories.plant):
@@ -52,6 +48,18 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
             f"predictions from there {getattr(predictor, 'beyond', 'follow the same rule')}"
         )
     return result
+
+
+def _chunk(settings: Evaluate, inputs: Inputs, rows: slice, progress: Progress) -> Packed:
+    trajectories = inputs["trajectories"].finished()
+    assert settings.first is not None, "settled from the plant"
+    found = []
+    for block in blocks(rows, max(1, SAMPLES // trajectories.steps)):
+        found.append(
+            evaluate(inputs["predictor"], trajectories, block, settings.first, settings.restart, settings.relift)
+        )
+        progress(block.stop - rows.start, rows.stop - rows.start)
+    return join(found).pack()
 
 
 def _differing(one: Meta, other: Meta) -> list[str]:
@@ -107,7 +115,7 @@ def _estimate(task: Task) -> Cost:
 
 STAGE = Stage(
     name="evaluate",
-    version=4,
+    version=5,
     settings=lambda values: build(Evaluate, values),
     run=_run,
     unpack=Evaluation.unpack,
@@ -115,4 +123,5 @@ STAGE = Stage(
     describe=_describe,
     check=_check,
     estimate=_estimate,
+    chunk=_chunk,
 )

@@ -81,7 +81,7 @@ def _order(evaluation: Task, experiment: Experiment) -> Series:
         )
     test = evaluation.input("trajectories").ancestor("sample").settings
     inputs = INPUTS[test.excitation] if isinstance(test, (BoxSample, PointSample)) else test.kind
-    return Series(f"{about.data}, {inputs}", about.order)
+    return Series(f"{about.data}, {inputs}", float(about.order))
 
 
 def _modes(evaluation: Task, experiment: Experiment) -> Series:
@@ -91,7 +91,7 @@ def _modes(evaluation: Task, experiment: Experiment) -> Series:
         raise InvalidValueError("the figure takes evaluations of eigenfunctions, which have modes")
     n_x = len(PLANTS[predictor.ancestor("simulate").settings.plant].states)
     count = 2 * (fit.pairs or 0) + 2 if fit.eigenvalues in PAIRS else lattice_size(n_x, fit.degree)
-    return Series(fit.eigenvalues, count)
+    return Series(fit.eigenvalues, float(count))
 
 
 def _seconds(evaluation: Task, experiment: Experiment) -> Series:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from koopcli.errors import DamagedArtefactError, UnknownNameError
-from koopcli.records import Packed
 from koopcli.stages.base import Context, Cost, Reporter, Stage, Task
+from koopcli.stages.chunks import Chunk, ChunkedWork
 from koopcli.stages.recorded import content_of, recipe_of, settings_of
 from koopcli.stages.registry import STAGES
+from koopcli.stages.workers import Workers
 from koopcli.store import Record, Store
 from koopcli.store.identity import key_of
 from koopcli.store.provenance import provenance
@@ -51,11 +52,13 @@ class Step:
 class Pipeline:
     """Runs tasks against a store, telling the ``reporter`` what was made and what was reused."""
 
-    def __init__(self, store: Store, reporter: Reporter) -> None:
+    def __init__(self, store: Store, reporter: Reporter, workers: Workers | None = None) -> None:
         self.store = store
         self.reporter = reporter
+        self.workers = workers or Workers()
         self._records: dict[Task, Record] = {}
-        self._announced: set[str] = set()
+        self.said: dict[str, str] = {}
+        """What was said of each artefact, by name."""
 
     def make(self, task: Task) -> Artefact:
         """The artefact of ``task``, from the store where possible; what is missing upstream is made first."""
@@ -69,8 +72,8 @@ class Pipeline:
         steps: dict[Task, Step] = {}
 
         def visit(step: Task) -> None:
-            record = self._known(step)
-            if record is not None and self.store.has_object(record):
+            record = self.found(step)
+            if record is not None:
                 steps[step] = Step(step, "reuse", record.name, Cost(0, 0))
                 return
             for _, upstream in step.inputs:
@@ -84,6 +87,11 @@ class Pipeline:
         self.check(task)
         visit(task)
         return list(steps.values())
+
+    def found(self, task: Task) -> Record | None:
+        """The record of ``task`` if it and its object are in the store, neither of which is read."""
+        record = self._known(task)
+        return record if record is not None and self.store.has_object(record) else None
 
     def named(self, text: str) -> Task:
         """The task of the artefact named ``text``, with its inputs as far as their records are known."""
@@ -156,12 +164,13 @@ class Pipeline:
             self.reporter.warn(f"{error}; making it again")
             return None
         self._records[task] = record
-        self._announce(record, "reused")
+        self.announce(record.name, "reused")
         return content
 
     def _build(self, task: Task) -> tuple[Record, Any, bool]:
         """Make ``task`` under its lock, unless another process has just done so."""
         stage = STAGES[task.stage]
+        self._refuse_without_room(task)
         inputs = {role: self._obtain(upstream)[:2] for role, upstream in task.inputs}
         recipe = recipe_of(task, {role: record for role, (record, _) in inputs.items()})
         key = key_of(recipe)
@@ -176,23 +185,33 @@ class Pipeline:
             if there is not None and found is not None:
                 return there, found, True
             start = time.perf_counter()
-            parts = self.store.parts(key)
-            with self.reporter.progress(stage.name) as progress:
-                context = Context(progress, self.reporter.warn, _Chunks(parts, progress, self.reporter.note))
-                content = stage.run(task.settings, {role: content for role, (_, content) in inputs.items()}, context)
-            seconds = time.perf_counter() - start
+            contents = {role: content for role, (_, content) in inputs.items()}
             lineage = {role: f"{record.stage}/{record.key}" for role, (record, _) in inputs.items()}
+            with self.reporter.progress(stage.name) as progress:
+                whole = Chunk(self.store.root, task.stage, task.settings, key, tuple(lineage.items()), at_hand=contents)
+                chunks = ChunkedWork(self.store, whole, self.workers, progress, self.reporter.note)
+                content = stage.run(task.settings, contents, Context(progress, self.reporter.warn, chunks))
+            seconds = time.perf_counter() - start
             made = self.store.commit(recipe, lineage, content.pack(), provenance(seconds))
             if there is not None and there.data != made.data:
                 self.reporter.warn(
                     f"{made.name} came out different in its last bits; what follows from it is made anew"
                 )
-            parts.clear()
+            self.store.parts(key).clear()
         # Go on with what a later process would read: the memory layout of an array moves the last bits of products.
         content = content_of(made, self.store)
         self._records[task] = made
-        self._announce(made, f"made in {seconds:.1f} s: {stage.describe(stage.figures(content))}")
+        self.announce(made.name, f"made in {seconds:.1f} s: {stage.describe(stage.figures(content))}")
         return made, content, False
+
+    def _refuse_without_room(self, task: Task) -> None:
+        """Refuse what will not fit into the store, chunks and their whole at once, before anything is computed."""
+        stage = STAGES[task.stage]
+        try:
+            needed = stage.estimate(task).bytes * (2 if stage.chunk else 1)
+        except UnknownNameError:  # something behind a named artefact is gone, which only an estimate needs
+            return
+        self.store.require(needed)
 
     def _rebuildable(self, task: Task, record: Record | None) -> None:
         """Refuse to replace a named artefact by something that today's code would not give the same key."""
@@ -205,31 +224,8 @@ class Pipeline:
                 "gone or another version made it: run its command afresh"
             )
 
-    def _announce(self, record: Record, what: str) -> None:
-        if record.name not in self._announced:
-            self._announced.add(record.name)
-            self.reporter.note(f"{record.name:<24} {what}")
-
-
-@dataclass
-class _Chunks:
-    """Chunked work of one artefact; see :class:`koopcli.stages.base.Chunks`."""
-
-    parts: Any
-    progress: Callable[[int, int], None]
-    note: Callable[[str], None]
-
-    def __call__(self, count: int, size: int, compute: Callable[[slice], Packed]) -> list[Packed]:
-        """The packed results of all slices of ``range(count)``, in order."""
-        slices = [slice(start, min(start + size, count)) for start in range(0, count, size)]
-        results = [self.parts.read(i) for i in range(len(slices))]
-        there = sum(result is not None for result in results)
-        if there:
-            self.note(f"{there} of {len(slices)} chunks were already there")
-        for i, rows in enumerate(slices):
-            if results[i] is None:
-                results[i] = compute(rows)
-                if len(slices) > 1:
-                    self.parts.commit(i, results[i])
-            self.progress(rows.stop, count)
-        return results
+    def announce(self, name: str, what: str) -> None:
+        """Say how an artefact came here, once."""
+        if name not in self.said:
+            self.said[name] = what
+            self.reporter.note(f"{name:<24} {what}")

@@ -83,7 +83,8 @@ def driven(experiment: Experiment, plant: Simulate) -> Task:
 
 def remembered_simulation(about: Meta, dt: float) -> Simulate:
     """The simulation that a predictor remembers, for when its trajectories are no longer in the store."""
-    return build(Simulate, {**about, "dt": dt})
+    found: Simulate = build(Simulate, {**about, "dt": dt})
+    return found.settled()
 
 
 def evaluation(experiment: Experiment, of: Task | None = None, on: Task | None = None) -> Task:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 
@@ -11,7 +11,8 @@ from koopcli.config.driving import ManoeuvreSample
 from koopcli.config.samples import SAMPLED_FOR
 from koopcli.config.settings import Simulate
 from koopcli.errors import InvalidValueError
-from koopcli.records import ENDS, Course, Meta, Sample, Trajectories
+from koopcli.progress import Progress
+from koopcli.records import ENDS, Course, Meta, Packed, Sample, Trajectories, join
 from koopcli.simulation.integrate import STIFF, integrate
 from koopcli.simulation.reference import reference
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
@@ -20,22 +21,38 @@ from koopcli.vehicles.plants import PLANTS, Plant
 
 SECONDS_A_STEP = {"forces": 3e-7, "slips": 1e-5, "wheels": 3e-5}
 REFERENCE_STEP = 3e-3
+COURSE_BYTES = 24.0  # held of every trajectory; states and inputs are on disk, but for a chunk of them
+SLOWER = 100  # by so much are chunks of the reference solver smaller
 
 
 def _run(settings: Simulate, inputs: Inputs, context: Context) -> Trajectories:
     sample: Sample = inputs["sample"]
-    assert settings.steps is not None
-    assert settings.plant is not None
+    parts = [Trajectories.unpack(part) for part in context.chunks(sample.trajectories, _rows(settings))]
+    found = replace(join(parts), product=sample.product)
+    assert found.course is not None, "of what was simulated here"
+    _report(found.course, context)
+    return found
+
+
+def _chunk(settings: Simulate, inputs: Inputs, rows: slice, progress: Progress) -> Packed:
     plant = _plant(settings)
-    x0, u = sample.expand(settings.steps)
+    assert settings.steps is not None, "settled from the sample"
+    x0, u = inputs["sample"].expand(settings.steps, rows)
     if settings.reference:
-        x, course = reference(plant.rhs, x0, u, settings.dt, context.progress)
+        x, course = reference(plant.rhs, x0, u, settings.dt, progress)
     else:
-        x, course = integrate(plant.rhs, x0, u, settings.dt, context.progress, plant.fastest_rate)
-    _report(course, context)
+        x, course = integrate(plant.rhs, x0, u, settings.dt, progress, plant.fastest_rate)
     about = {name: getattr(settings, name) for name in ("plant", *OPTIONS)}
     about["vehicle"] = asdict(settings.vehicle)
-    return Trajectories(x, u, settings.dt, plant.states, plant.inputs, sample.product, about, course)
+    return Trajectories(x, u, settings.dt, plant.states, plant.inputs, None, about, course).pack()
+
+
+def _rows(settings: Simulate) -> int:
+    """Trajectories of one chunk."""
+    assert settings.chunk is not None, "settled from the plant"
+    assert settings.steps is not None, "settled from the sample"
+    samples = settings.chunk // (SLOWER if settings.reference else 1)
+    return max(1, samples // settings.steps)
 
 
 def _report(course: Course, context: Context) -> None:
@@ -108,18 +125,27 @@ def _check(task: Task) -> None:
             f"the sample holds fresh inputs for {sample.input_steps} steps, 'simulate.steps' is {steps}: "
             "sample again with more --steps"
         )
-    refuse_beyond_memory("the trajectories", _estimate(task).bytes, "the count or the steps")
+    rows = min(_rows(task.settings), sample.trajectories)
+    held = rows * _row_bytes(task.settings) + COURSE_BYTES * sample.trajectories
+    refuse_beyond_memory("the trajectories", held, "the count, or simulate.chunk")
 
 
 def _estimate(task: Task) -> Cost:
     n, steps = task.ancestor("sample").settings.trajectories, task.settings.steps
-    plant = PLANTS[task.settings.plant]
     each = SECONDS_A_STEP[task.settings.plant]
     if each > SECONDS_A_STEP["forces"]:
         each *= max(1.0, task.settings.dt / 0.01)  # stiff: a longer step is walked through in more
     if task.settings.reference:
         each = REFERENCE_STEP
-    return Cost(each * n * steps, 8.0 * n * (len(plant.states) * (steps + 1) + len(plant.inputs) * steps + 3))
+    return Cost(each * n * steps, n * _row_bytes(task.settings))
+
+
+def _row_bytes(settings: Simulate) -> float:
+    """Bytes of one trajectory."""
+    assert settings.plant is not None, "settled from the sample"
+    assert settings.steps is not None, "settled from the sample"
+    plant = PLANTS[settings.plant]
+    return 8.0 * (len(plant.states) * (settings.steps + 1) + len(plant.inputs) * settings.steps + 3)
 
 
 STAGE = Stage(
@@ -132,4 +158,5 @@ STAGE = Stage(
     describe=_describe,
     check=_check,
     estimate=_estimate,
+    chunk=_chunk,
 )

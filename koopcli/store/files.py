@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
+import io
 import os
+import resource
 import secrets
 import shutil
 import socket
+import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from koopcli.errors import StorageError
+from koopcli.errors import DamagedArtefactError, StorageError
 
 HOUR, DAY = 3600.0, 86400.0
+JSON_LIMIT = 16 << 20  # bytes of a record or a pin
+
+
+class UntrustedFileError(DamagedArtefactError):
+    """A file that koop did not write. The text is the reason alone: a caller that knows what the file is names it."""
+
+
+def printable(text: str) -> str:
+    """``text`` with everything replaced that would steer a terminal."""
+    return "".join(c if c.isprintable() else "�" for c in text)
 
 
 @contextmanager
-def storage_errors(path: Path, needed: int = 0) -> Iterator[None]:
+def storage_errors(path: Path, needed: float = 0) -> Iterator[None]:
     """Turn an ``OSError`` of writing to ``path`` into one line: what failed, what was needed and what is free."""
     try:
         yield
@@ -78,6 +92,36 @@ def sha256_file(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+@contextmanager
+def open_regular(path: Path, flags: int = os.O_NOFOLLOW) -> Iterator[tuple[io.FileIO, int]]:
+    """The regular file at ``path`` and its size; ``flags`` 0 follows a link, which only a user's own path may be.
+
+    Raises ``UntrustedFileError`` for a link, folder, pipe or device put in its place, without waiting for it.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | flags)
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.ENXIO):  # a link, a socket
+            raise UntrustedFileError("it is not a regular file") from error
+        raise
+    try:
+        found = os.fstat(descriptor)
+        if not stat.S_ISREG(found.st_mode):
+            raise UntrustedFileError("it is not a regular file")
+        with open(descriptor, "rb", buffering=0, closefd=False) as file:
+            yield file, found.st_size
+    finally:
+        os.close(descriptor)
+
+
+def read_small(path: Path) -> bytes:
+    """The content of a record or a pin. Raises ``UntrustedFileError`` for anything but a regular file."""
+    with open_regular(path) as (file, size):
+        if size > JSON_LIMIT:
+            raise UntrustedFileError(f"it is over {size_text(JSON_LIMIT)}")
+        return file.read(JSON_LIMIT)
+
+
 def make_folder(path: Path) -> None:
     """Create ``path`` and its parents durably."""
     if path.is_dir():
@@ -96,6 +140,27 @@ def sweep(temporary: Path, now: float) -> None:
                 path.unlink()
 
 
+def write_at(descriptor: int, content: memoryview, place: int) -> None:
+    """Write all of ``content``, which one call may not."""
+    while content:
+        written = os.pwrite(descriptor, content, place)
+        content, place = content[written:], place + written
+
+
+def refuse_without_room(path: Path, needed: float) -> None:
+    """Raise ``OSError`` where a file of ``needed`` bytes would not fit: on the disk, or in what a process may write."""
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+    if resource.RLIM_INFINITY != limit < needed:
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+    refuse_on_full_disk(path, needed)
+
+
+def refuse_on_full_disk(path: Path, needed: float) -> None:
+    """Raise ``OSError`` where the disk has no room for ``needed`` bytes."""
+    if needed > _free(path):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
 def size_text(size: float) -> str:
     """Bytes for people: 13.8 MB."""
     for unit in ("B", "kB", "MB", "GB"):
@@ -108,9 +173,7 @@ def size_text(size: float) -> str:
 def _write_new(path: Path, content: bytes) -> None:
     descriptor = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
     try:
-        view = memoryview(content)
-        while view:
-            view = view[os.write(descriptor, view) :]
+        write_at(descriptor, memoryview(content), 0)
         os.fsync(descriptor)
     finally:
         os.close(descriptor)

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from koopcli.blocks import Blocks
 from koopcli.errors import InvalidValueError
-from koopcli.records import Blocks, Packed
+from koopcli.records import Packed
 
 SCHEMA = 1
 SLAB = 1 << 24  # bytes hashed or written at a time

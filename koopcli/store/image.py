@@ -5,16 +5,27 @@ HDF5 never writes to an object's final name: an interrupted write would leave a 
 
 from __future__ import annotations
 
+import io
 import json
+import mmap
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 
+from koopcli.errors import InvalidValueError
 from koopcli.records import Array, Packed
-from koopcli.store.identity import plain, slabs
+from koopcli.store.files import UntrustedFileError, open_regular, printable, refuse_without_room, write_at
+from koopcli.store.identity import canonical, plain, slabs
+from koopcli.store.texts import Texts
+from koopcli.store.walk import LARGEST, refusals, refuse, walk
 
 MEMORY_LIMIT = 256 << 20
+IN_MEMORY = 4 * MEMORY_LIMIT  # bytes that an image in memory may unpack to
 
 
 def data_bytes(packed: Packed) -> int:
@@ -27,53 +38,135 @@ def data_bytes(packed: Packed) -> int:
 def to_bytes(packed: Packed) -> bytes:
     """The HDF5 image; the same record gives the same bytes."""
     with h5py.File.in_memory(libver=("v110", "v110")) as file:
-        _fill(file, packed)
+        for dataset, array in _laid_out(file, packed):
+            dataset[...] = array.values[...]
         file.flush()
         return bytes(file.id.get_file_image())
 
 
 def to_file(packed: Packed, path: Path) -> None:
-    """The HDF5 image in a new file, array by array in slabs, with all space reserved before the first value."""
+    """The HDF5 image in a new file. HDF5 only lays it out: it does not survive a disk that is full.
+
+    The space is reserved before the first value, and the values are written to their places by plain system calls.
+    """
+    refuse_without_room(path, data_bytes(packed))
     with h5py.File(path, "x", libver=("v110", "v110"), locking=False) as file:
-        _fill(file, packed)
+        places = [(dataset.id.get_offset(), array) for dataset, array in _laid_out(file, packed)]
+    descriptor = os.open(path, os.O_RDWR)
+    try:
+        os.posix_fallocate(descriptor, 0, os.fstat(descriptor).st_size)
+        for start, array in places:
+            place = start
+            for slab in slabs(array.values):
+                content = np.ascontiguousarray(slab, dtype=_stored(array)).reshape(-1).view(np.uint8)
+                write_at(descriptor, content.data, place)
+                place += len(content)
+    finally:
+        os.close(descriptor)
 
 
 def from_bytes(image: bytes) -> Packed:
-    """The record of an image in memory, its arrays in memory too."""
-    with h5py.File.in_memory(image) as file:
-        lazy = _packed(file)
-        arrays = {path: Array(array.values[...], array.axes, array.units) for path, array in lazy.arrays.items()}
-        return Packed(arrays, lazy.meta)
+    """The record of an image in memory, its arrays in memory too. Raises ``UntrustedFileError``."""
+    with refusals():
+        texts = Texts(image)
+        with h5py.File.in_memory(image) as file:
+            lazy = _packed(file, texts, IN_MEMORY)
+            arrays = {path: Array(array.values[...], array.axes, array.units) for path, array in lazy.arrays.items()}
+            return Packed(arrays, lazy.meta)
 
 
 def from_file(path: Path) -> Packed:
-    """The record of a file, its arrays left on disk."""
-    return _packed(h5py.File(path, "r", locking=False))
+    """The record of a file, its arrays left on disk. Raises ``UntrustedFileError``."""
+    with open_regular(path) as (opened, _):
+        return from_open(opened)
 
 
-def _fill(file: h5py.File, packed: Packed) -> None:
+def from_open(opened: io.FileIO) -> Packed:
+    """The record of that very file, whatever its path leads to by now; its arrays stay on disk."""
+    with refusals(), mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        texts = Texts(content)
+        file = h5py.File(f"/dev/fd/{opened.fileno()}", "r", locking=False)
+        try:
+            return _packed(file, texts)
+        except BaseException:
+            file.close()
+            raise
+
+
+def read_foreign(path: Path) -> Packed:
+    """The record of a file that a user names. Raises ``InvalidValueError`` for one that koop would not have written."""
+    try:
+        with open_regular(path, 0) as (opened, size):
+            return from_open(opened) if size > MEMORY_LIMIT else from_bytes(opened.read())
+    except UntrustedFileError as error:
+        raise InvalidValueError(f"{printable(str(path))} cannot be used: {error}") from error
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else "it cannot be read"
+        raise InvalidValueError(f"{printable(str(path))} cannot be used: {reason}") from error
+
+
+def from_path(path: Path) -> Packed:
+    """The record of a file that is opened for the time of a read only, its arrays left on disk."""
+    with refusals(), h5py.File(path, "r", locking=False) as file:
+        with mmap.mmap(file.id.get_vfd_handle(), 0, access=mmap.ACCESS_READ) as content:
+            lazy = _packed(file, Texts(content))
+        arrays = {
+            name: Array(_OnDisk(path, name, a.values.shape, a.values.dtype), a.axes, a.units)
+            for name, a in lazy.arrays.items()
+        }
+        return Packed(arrays, lazy.meta)
+
+
+@dataclass(frozen=True)
+class _OnDisk:
+    """An array in a file, read when it is indexed."""
+
+    path: Path
+    name: str
+    shape: tuple[int, ...]
+    dtype: Any
+
+    def __getitem__(self, index: Any, /) -> Any:
+        with h5py.File(self.path, "r", locking=False) as file:
+            return file[self.name][index]
+
+
+def _laid_out(file: h5py.File, packed: Packed) -> Iterator[tuple[h5py.Dataset, Array]]:
+    """Every array's dataset, with its attributes and without its values."""
     file.attrs["meta"] = json.dumps(plain(packed.meta), sort_keys=True)
     layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     layout.set_layout(h5py.h5d.CONTIGUOUS)
     layout.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
     for path, array in sorted(packed.arrays.items()):
-        dtype = np.dtype(array.values.dtype).newbyteorder("<")
-        dataset = file.create_dataset(path, shape=array.values.shape, dtype=dtype, dcpl=layout.copy())
+        dataset = file.create_dataset(path, shape=array.values.shape, dtype=_stored(array), dcpl=layout.copy())
         dataset.attrs["units"] = array.units
         dataset.attrs["axes"] = ", ".join(array.axes)
-        start = 0
-        for slab in slabs(array.values):
-            dataset[start : start + len(slab)] = slab
-            start += len(slab)
+        yield dataset, array
 
 
-def _packed(file: h5py.File) -> Packed:
+def _stored(array: Array) -> np.dtype[Any]:
+    dtype: np.dtype[Any] = np.dtype(array.values.dtype)
+    return dtype.newbyteorder("<")
+
+
+def _packed(file: h5py.File, texts: Texts, limit: int = LARGEST) -> Packed:
+    """The record of an open file that has passed the walk; its arrays are the file's own datasets."""
     arrays: dict[str, Array] = {}
-
-    def visit(name: str, item: object) -> None:
-        if isinstance(item, h5py.Dataset):
-            arrays[name] = Array(item, tuple(item.attrs["axes"].split(", ")), item.attrs["units"])
-
-    file.visititems(visit)
-    return Packed(arrays, json.loads(file.attrs["meta"]))
+    for path, dataset in walk(file, limit).items():
+        beside = texts.of(h5py.h5o.get_info(dataset.id).addr)
+        axes, units = beside.get("axes", "\0"), beside.get("units", "\0")
+        array = Array(dataset, tuple(axes.split(", ")), units)
+        if not (axes + units).isprintable() or len(array.axes) != len(dataset.shape):
+            refuse(f"'{path}' lacks the names or the units of its axes")
+        if dataset.dtype == bool and any((slab.view(np.uint8) > 1).any() for slab in slabs(dataset)):
+            refuse(f"'{path}' holds something between true and false")  # which numpy would count wrongly
+        arrays[path] = array
+    try:
+        meta = json.loads(texts.of(h5py.h5o.get_info(file.id).addr).get("meta", ""))
+        canonical(meta)  # finite, of Unicode and not too deep
+    except (ValueError, RecursionError, InvalidValueError):
+        meta = None
+    if not isinstance(meta, dict):
+        refuse("its facts are not a JSON object")
+    return Packed(arrays, meta)

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from koopcli.records import Packed
 from koopcli.store import image
-from koopcli.store.files import storage_errors
+from koopcli.store.files import sha256_file, storage_errors
 
+SMALL = 4 << 20  # bytes; larger chunks are not held in memory
 Put = Callable[[Packed, Callable[[str], Path]], Path]
 """Write a record durably to the path found from the digest of its bytes."""
 
@@ -23,13 +24,13 @@ class Parts:
         self._put = put
 
     def read(self, i: int) -> Packed | None:
-        """Chunk ``i``, verified, or None."""
+        """Chunk ``i``, verified, or None; a large one stays on disk."""
         with storage_errors(self._folder):
             for path in sorted(self._folder.glob(f"{i}-*.h5")):
-                content = path.read_bytes()
-                if hashlib.sha256(content).hexdigest() == path.stem.partition("-")[2]:
-                    return image.from_bytes(content)
-                path.unlink()
+                found = _verified(path)
+                if found is not None:
+                    return found
+                path.unlink(missing_ok=True)
         return None
 
     def commit(self, i: int, packed: Packed) -> None:
@@ -42,3 +43,12 @@ class Parts:
             for path in self._folder.iterdir():
                 path.unlink()
             self._folder.rmdir()
+
+
+def _verified(path: Path) -> Packed | None:
+    """The chunk at ``path``, if it is what its name says."""
+    digest = path.stem.partition("-")[2]
+    if path.stat().st_size > SMALL:
+        return image.from_path(path) if sha256_file(path) == digest else None
+    content = path.read_bytes()
+    return image.from_bytes(content) if hashlib.sha256(content).hexdigest() == digest else None

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from koopcli.errors import UnknownNameError
-from koopcli.store.files import publish, storage_errors
-from koopcli.store.records import Record
+from koopcli.store.files import UntrustedFileError, printable, publish, read_small, storage_errors
+from koopcli.store.records import Record, is_name
 from koopcli.store.store import Store
 
 
@@ -38,9 +38,13 @@ def pins(store: Store) -> dict[str, list[str]]:
     for path in sorted((store.root / "refs").glob("*.json")):
         found[path.stem] = []
         try:
-            found[path.stem] = [str(name) for name in json.loads(path.read_text())["names"]]
-        except (OSError, ValueError, KeyError, TypeError):
-            store.warn(f"the pin {path.stem} is damaged: `koop unpin {path.stem}`, and pin again")
+            names = json.loads(read_small(path))["names"]
+            if not isinstance(names, list) or not all(map(is_name, names)):
+                raise ValueError
+            found[path.stem] = names
+        except (OSError, UntrustedFileError, ValueError, KeyError, TypeError, RecursionError):
+            label = printable(path.stem)
+            store.warn(f"the pin {label} is damaged: `koop unpin {label}`, and pin again")
     return found
 
 

@@ -24,6 +24,7 @@ def provenance(seconds: float) -> dict[str, Any]:
         "host": platform.node(),
         "platform": platform.platform(),
         "cores": os.cpu_count(),
+        "blas_threads": os.environ.get("OPENBLAS_NUM_THREADS"),
         "python": platform.python_version(),
         "versions": _versions(),
         "git": _git(),

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from koopcli.errors import NewerFormatError
+from koopcli.errors import InvalidValueError, NewerFormatError
 from koopcli.store.identity import SCHEMA, canonical, key_of
 
 SHORT = 12  # digits of a key in a name
+STAGE = re.compile(r"[a-z][a-z0-9-]{0,63}")
+DIGEST = re.compile(r"[0-9a-f]{64}")
 
 
 class BadRecordError(Exception):
@@ -63,7 +66,7 @@ class Record:
         try:
             content = json.loads(text)
             schema = content["schema"]
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise BadRecordError from error
         if isinstance(schema, int) and schema > SCHEMA:
             raise NewerFormatError(
@@ -75,11 +78,29 @@ class Record:
             if check != _check(content) or content.pop("schema") != SCHEMA:
                 raise BadRecordError
             record = cls(**content)
-            if (record.stage, record.key) != (stage, key):
+            if not _well_formed(record) or (record.stage, record.key) != (stage, key):
                 raise BadRecordError
-        except (KeyError, TypeError, AttributeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError, InvalidValueError) as error:
             raise BadRecordError from error
         return record
+
+
+def is_name(name: object) -> bool:
+    """Whether ``name`` is "stage/key", which leads to a record and nowhere else."""
+    stage, _, key = name.partition("/") if isinstance(name, str) else ("", "", "")
+    return bool(STAGE.fullmatch(stage) and DIGEST.fullmatch(key))
+
+
+def _well_formed(record: Record) -> bool:
+    """Whether each entry has its form: paths are made of them."""
+    return (
+        all(isinstance(one, dict) for one in (record.recipe, record.lineage, record.provenance))
+        and all(isinstance(one, str) and DIGEST.fullmatch(one) for one in (record.object, record.data))
+        and type(record.size) is int
+        and record.size >= 0
+        and all(map(is_name, record.lineage.values()))
+        and isinstance(record.recipe.get("stage"), str)
+    )
 
 
 def _check(content: Mapping[str, Any]) -> str:

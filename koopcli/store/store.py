@@ -21,11 +21,21 @@ from koopcli.errors import (
 )
 from koopcli.records import Packed
 from koopcli.store import image
-from koopcli.store.files import publish, reading_errors, sha256_file, storage_errors, sweep
+from koopcli.store.files import (
+    UntrustedFileError,
+    open_regular,
+    publish,
+    read_small,
+    reading_errors,
+    refuse_on_full_disk,
+    sha256_file,
+    storage_errors,
+    sweep,
+)
 from koopcli.store.identity import data_digest
 from koopcli.store.locks import hold
 from koopcli.store.parts import Parts
-from koopcli.store.records import SHORT, BadRecordError, Record
+from koopcli.store.records import SHORT, BadRecordError, Record, is_name
 
 KEY = re.compile(r"([0-9a-f]{64})\.json")
 CANDIDATES = 8
@@ -55,15 +65,15 @@ class Store:
 
     def record(self, stage: str, key: str) -> Record | None:
         """The record of ``key``, or None; a damaged one is put aside."""
+        if not is_name(f"{stage}/{key}"):
+            return None
         path = self._record_path(stage, key)
         try:
             with reading_errors(path):
-                text = path.read_bytes()
+                return Record.from_json(read_small(path), stage, key)
         except FileNotFoundError:
             return None
-        try:
-            return Record.from_json(text, stage, key)
-        except BadRecordError:
+        except (BadRecordError, UntrustedFileError):
             self.warn(f"the record of {stage}/{key[:SHORT]} is damaged {self._put_aside(path)}")
             return None
 
@@ -84,7 +94,8 @@ class Store:
 
         Raises ``UnknownNameError`` for none or several, ``DamagedArtefactError`` when its record does not read.
         """
-        matches = [(s, k) for s, k in self.index() if text and (f"{s}/{k}".startswith(text) or k.startswith(text))]
+        known = [(stage, key) for stage, key in self.index() if is_name(f"{stage}/{key}")]
+        matches = [(s, k) for s, k in known if text and (f"{s}/{k}".startswith(text) or k.startswith(text))]
         if len(matches) > 1:
             names = ", ".join(f"{stage}/{key[:SHORT]}" for stage, key in matches[:CANDIDATES])
             more = f" and {len(matches) - CANDIDATES} more" if len(matches) > CANDIDATES else ""
@@ -101,24 +112,22 @@ class Store:
         return self._object_path(record.object)
 
     def has_object(self, record: Record) -> bool:
-        """Whether the object is there; a record without its object is a miss."""
+        """Whether the object is there, as a file and not a link; a record without its object is a miss."""
+        path = self.path(record)
         with reading_errors(self.root):
-            return self.path(record).is_file()
+            return path.is_file() and not path.is_symlink()
 
     def read(self, record: Record) -> Packed:
         """The verified content. Raises ``DamagedArtefactError`` after putting a damaged object aside."""
         path = self.path(record)
         try:
             with reading_errors(path):
-                if path.stat().st_size <= image.MEMORY_LIMIT:
-                    content = path.read_bytes()
-                    if hashlib.sha256(content).hexdigest() == record.object:
-                        return image.from_bytes(content)
-                elif sha256_file(path) == record.object:
-                    return image.from_file(path)
+                return _verified(path, record)
         except FileNotFoundError as error:
             raise DamagedArtefactError(f"the object of {record.name} is missing") from error
-        raise DamagedArtefactError(f"the object of {record.name} is damaged {self._put_aside(path)}")
+        except UntrustedFileError as error:
+            reason = f"the object of {record.name} is damaged {self._put_aside(path)}: {error}"
+            raise DamagedArtefactError(reason) from error
 
     # writing
 
@@ -137,7 +146,14 @@ class Store:
             return first
         with storage_errors(self.root):
             self._publish(self._record_path(record.stage, record.key), record.to_json())
+        if not path.exists():  # a collection took it for an orphan just before its record was there
+            self._put(packed, self._object_path)
         return record
+
+    def require(self, needed: float) -> None:
+        """Raise ``StorageError`` where the disk has no room for ``needed`` bytes."""
+        with storage_errors(self.root, needed):
+            refuse_on_full_disk(self.root, needed)
 
     def lock(self, key: str, name: str) -> AbstractContextManager[None]:
         """Hold the lock of ``key`` for the time of a ``with``; see :func:`koopcli.store.locks.hold`."""
@@ -174,6 +190,19 @@ class Store:
                 if record is not None and self.has_object(record):  # without its object it is being made again
                     self.parts(folder.name).clear()
 
+    def inspect(self, record: Record) -> Packed:
+        """The verified content, as :meth:`read` has it; a damaged object stays where it is.
+
+        Raises ``UntrustedFileError`` for a damaged one and ``FileNotFoundError`` for a missing one.
+        """
+        return _verified(self.path(record), record)
+
+    def put_aside(self, path: Path) -> None:
+        """Move a damaged file to quarantine. Raises ``StorageError`` where that cannot be done."""
+        done = self._put_aside(path)
+        if os.path.lexists(path):
+            raise StorageError(f"{path} is damaged {done}: make the store writable, or choose another with --store")
+
     def _object_path(self, digest: str) -> Path:
         return self.root / "objects" / digest[:2] / f"{digest}.h5"
 
@@ -190,3 +219,15 @@ class Store:
         except OSError:
             return "and cannot be put aside in a read-only store"
         return "and was put aside"
+
+
+def _verified(path: Path, record: Record) -> Packed:
+    """The content of the one file that is opened, sized, hashed and walked. Raises ``UntrustedFileError``."""
+    with open_regular(path) as (file, size):
+        if size == record.size and size <= image.MEMORY_LIMIT:
+            content = file.read()
+            if hashlib.sha256(content).hexdigest() == record.object:
+                return image.from_bytes(content)
+        elif size == record.size and hashlib.file_digest(file, "sha256").hexdigest() == record.object:
+            return image.from_open(file)
+    raise UntrustedFileError("its bytes are not those that were stored")

@@ -217,8 +217,12 @@ def figure_records(name: str) -> dict:
     return {f"{i}/{role}": records[role] for i in range(1 if kind.draws == "one" else 2) for role in kind.roles}
 
 
-def _chunks(count, size, compute):
-    return [compute(slice(start, min(start + size, count))) for start in range(0, count, size)]
+def _chunks(stage, settings, inputs):
+    def chunks(count, size):
+        rows = (slice(start, min(start + size, count)) for start in range(0, count, size))
+        return [STAGES[stage].chunk(settings, inputs, one, silent) for one in rows]
+
+    return chunks
 
 
 TOYS = {
@@ -252,12 +256,15 @@ TOYS = {
         ),
     ],
     "simulate": [
-        (Simulate(vehicle=CAR, plant="forces", steps=3), {"sample": _sample()}),
-        (Simulate(vehicle=CAR, plant="forces", steps=2, force_per="wheel", dt=0.02), {"sample": _sample()}),
-        (Simulate(vehicle=CAR, plant="slips", steps=40), {"sample": _slid()}),
-        (Simulate(vehicle=ON_WHEELS, plant="wheels", steps=20), {"sample": _driven()}),
-        (Simulate(vehicle=ON_WHEELS, plant="wheels", steps=3, combined="none", v_eps=0.3), {"sample": _driven()}),
-        (Simulate(vehicle=ON_WHEELS, plant="wheels", steps=3, reference=True), {"sample": _driven()}),
+        (Simulate(vehicle=CAR, plant="forces", steps=3).settled(), {"sample": _sample()}),
+        (Simulate(vehicle=CAR, plant="forces", steps=2, force_per="wheel", dt=0.02).settled(), {"sample": _sample()}),
+        (Simulate(vehicle=CAR, plant="slips", steps=40).settled(), {"sample": _slid()}),
+        (Simulate(vehicle=ON_WHEELS, plant="wheels", steps=20).settled(), {"sample": _driven()}),
+        (
+            Simulate(vehicle=ON_WHEELS, plant="wheels", steps=3, combined="none", v_eps=0.3).settled(),
+            {"sample": _driven()},
+        ),
+        (Simulate(vehicle=ON_WHEELS, plant="wheels", steps=3, reference=True).settled(), {"sample": _driven()}),
     ],
     "fit-edmd": [
         (FitEdmd(order=2), {"trajectories": _trajectories(1)}),
@@ -333,7 +340,7 @@ def results(stage: str) -> dict[str, list[float]]:
     """Size, sum and weighted sum of every array the stage makes of its toys, and its figures; no image bytes."""
     found = {}
     for i, (settings, inputs) in enumerate(TOYS[stage]):
-        made = STAGES[stage].run(settings, inputs, Context(silent, lambda text: None, _chunks))
+        made = STAGES[stage].run(settings, inputs, Context(silent, lambda text: None, _chunks(stage, settings, inputs)))
         for name, array in made.pack().arrays.items():
             if name != "image":
                 values = np.asarray(array.values, dtype=float).ravel()

@@ -149,7 +149,7 @@ def failing_on(real, n, code):
     return call
 
 
-@pytest.mark.parametrize("call", ["open", "write", "fsync", "replace"])
+@pytest.mark.parametrize("call", ["open", "pwrite", "fsync", "replace"])
 @pytest.mark.parametrize("code", [errno.ENOSPC, errno.EIO, errno.EROFS])
 def test_an_error_at_any_write_leaves_the_old_state_or_the_new(store, monkeypatch, call, code):
     """Fail the n-th call of each kind, for every n of a commit: nothing committed is lost, nothing half is found."""
@@ -180,7 +180,7 @@ def test_a_full_disk_says_what_was_needed(store, monkeypatch):
     def full(*args):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(os, "write", full)
+    monkeypatch.setattr(os, "pwrite", full)
     with pytest.raises(StorageError, match=r"No space left on device \(80\.0 kB needed, .* free\)"):
         store.commit(recipe(), {}, packed(n=10_000), {})
     assert not list((store.root / "tmp").iterdir())

@@ -1,0 +1,107 @@
+"""The chunks of one artefact: which are there, which are to be computed, here or by workers, each committed alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from koopcli.blocks import blocks
+from koopcli.errors import DamagedArtefactError
+from koopcli.progress import Progress, silent
+from koopcli.records import Packed
+from koopcli.stages.base import Inputs
+from koopcli.stages.recorded import content_of
+from koopcli.stages.registry import STAGES
+from koopcli.stages.workers import Workers
+from koopcli.store import Store
+
+FINE = 1000  # parts of a chunk that progress is told in
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """One chunk of one artefact. It names its inputs, by role, so that another process finds them in the store; where
+    it runs in the process that has them it holds them, as ``at_hand``. ``start`` to ``stop`` are its rows.
+    """
+
+    root: Path
+    stage: str
+    settings: Any
+    key: str
+    inputs: tuple[tuple[str, str], ...]
+    i: int = 0
+    start: int = 0
+    stop: int = 0
+    at_hand: Inputs | None = None
+    progress: Progress = silent
+
+    def compute(self) -> Packed:
+        """What the stage makes of these rows."""
+        inputs = self.at_hand
+        if inputs is None:
+            inputs = {role: _content(self.root, name) for role, name in self.inputs}
+        chunk = STAGES[self.stage].chunk
+        assert chunk is not None, "only a stage with chunks asks for them"
+        return chunk(self.settings, inputs, slice(self.start, self.stop), self.progress)
+
+
+def commit(chunk: Chunk) -> list[str]:
+    """Compute a chunk and store it; returns what the store warned of."""
+    warned: list[str] = []
+    Store(chunk.root, warned.append).parts(chunk.key).commit(chunk.i, chunk.compute())
+    return warned
+
+
+@dataclass(frozen=True)
+class ChunkedWork:
+    """What a stage calls for its chunks; see :class:`koopcli.stages.base.Chunks`."""
+
+    store: Store
+    whole: Chunk
+    """The artefact, of which each chunk is a part."""
+    workers: Workers
+    progress: Progress
+    note: Callable[[str], None]
+
+    def __call__(self, count: int, size: int) -> list[Packed]:
+        """The packed results of all slices of ``range(count)``, in order; large ones stay on disk."""
+        chunks = [self._chunk(i, rows, count) for i, rows in enumerate(blocks(slice(0, count), size))]
+        if len(chunks) == 1:
+            return [chunks[0].compute()]
+        parts = self.store.parts(self.whole.key)
+        found = [parts.read(chunk.i) for chunk in chunks]
+        missing = [chunk for chunk, there in zip(chunks, found, strict=True) if there is None]
+        if len(missing) < len(chunks):
+            self.note(f"{len(chunks) - len(missing)} of {len(chunks)} chunks were already there")
+        alone = self.workers.count == 1
+        jobs = missing if alone else [replace(chunk, at_hand=None, progress=silent) for chunk in missing]
+        ready = count - sum(chunk.stop - chunk.start for chunk in missing)
+        for chunk, warned in self.workers.each(commit, jobs):
+            for text in warned:
+                self.store.warn(text)
+            ready += chunk.stop - chunk.start
+            if not alone:
+                self.progress(ready, count)
+        for chunk in missing:  # where no lock keeps others away, one may have cleared them: then they are made here
+            found[chunk.i] = parts.read(chunk.i) or chunk.compute()
+        return [one for one in found if one is not None]
+
+    def _chunk(self, i: int, rows: slice, count: int) -> Chunk:
+        def inside(done: int, total: int) -> None:
+            length = rows.stop - rows.start
+            self.progress(FINE * rows.start + FINE * length * done // max(1, total), FINE * count)
+
+        return replace(self.whole, i=i, start=rows.start, stop=rows.stop, progress=inside)
+
+
+@lru_cache(maxsize=4)
+def _content(root: Path, name: str) -> Any:
+    """The verified content of an input, kept from one chunk to the next."""
+    store = Store(root)
+    record = store.record(*name.split("/"))
+    if record is None:
+        raise DamagedArtefactError(f"{name} is no longer in the store: run the same command again")
+    return content_of(record, store)

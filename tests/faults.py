@@ -1,0 +1,186 @@
+"""Faults, counted: what a store loses, and what damage it takes for good, under each.
+
+The tests run these a few times; ``python -m tests.faults`` runs them at length and prints the table of
+docs/reliability.md.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from koopcli.errors import DamagedArtefactError, StorageError
+from koopcli.store import Record, Store
+from tests.writer import KEYS, commit, content
+
+CALLS = ("open", "pwrite", "fsync", "replace", "mkdir")
+
+
+@dataclass
+class Count:
+    """What came of a fault: how often it was ``injected``, how often it struck (a write was refused, a process died,
+    damage was found), what was ``lost`` of what had been committed, and what damage was ``accepted`` on reading.
+    """
+
+    injected: int = 0
+    struck: int = 0
+    lost: int = 0
+    accepted: int = 0
+
+
+def good(store: Store, record: Record) -> bool:
+    """Whether what is read is what was committed."""
+    packed = store.read(record)
+    expected = content(packed.meta["seed"])
+    right = record.recipe["settings"]["seed"] == packed.meta["seed"]
+    return right and bool((np.asarray(packed.arrays["x"].values) == expected.arrays["x"].values).all())
+
+
+def settle(store: Store, committed: set[str], count: Count) -> None:
+    """Count what is lost of ``committed`` keys, and what is wrong of all that the store shows."""
+    shown = dict.fromkeys(key for _, key in store.index())
+    for key in committed - shown.keys():
+        count.lost += 1
+        print(f"lost {key}", file=sys.stderr)
+    for key in shown:
+        record = store.record("sample", key)
+        try:
+            if record is None or not store.has_object(record):
+                count.lost += key in committed
+            elif not good(store, record):
+                count.accepted += 1
+        except DamagedArtefactError:
+            count.lost += key in committed
+
+
+def kills(folder: Path, times: int, writers: int, seed: int = 0) -> Count:
+    """kill -9 of ``writers`` processes that commit to the same keys of one store, at random moments."""
+    rng, count, committed = random.Random(seed), Count(), set()
+    names = {i: commit(Store(folder / "names"), i).key for i in range(KEYS)}
+    while count.injected < times:
+        first = rng.randrange(KEYS)
+        command = [sys.executable, "-m", "tests.writer", str(folder / "store"), str(first), "100000"]
+        running = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(writers)]
+        said = [process.stdout.readline() for process in running]  # begun
+        time.sleep(rng.uniform(0.0, 0.15))
+        for process in running:
+            process.kill()
+        for process, line in zip(running, said, strict=True):
+            rest, _ = process.communicate()
+            count.injected += 1
+            count.struck += process.returncode < 0
+            committed |= {names[int(text)] for text in f"{line}{rest}".splitlines() if text}
+        settle(Store(folder / "store"), committed, count)
+        if count.injected % 5 == 0:  # so that first commits are struck too, not only those of what is there
+            subprocess.run(["rm", "-rf", str(folder / "store")], check=True)
+            committed = set()
+    return count
+
+
+@contextmanager
+def failing(call: str, n: int, code: int) -> Iterator[Callable[[], int]]:
+    """Make the ``n``-th ``os.call`` fail for the time of a ``with``; gives how many there were."""
+    real, calls = getattr(os, call), 0
+
+    def counted(*args: object, **kwargs: object) -> object:
+        nonlocal calls
+        calls += 1
+        if calls == n:
+            raise OSError(code, os.strerror(code))
+        return real(*args, **kwargs)
+
+    setattr(os, call, counted)
+    try:
+        yield lambda: calls
+    finally:
+        setattr(os, call, real)
+
+
+def errors(folder: Path, code: int, rounds: int = 1) -> Count:
+    """An error at the n-th call of each kind, for every n of a commit: the old state is left, or the new."""
+    count = Count()
+    for i in range(rounds):
+        for call in CALLS:
+            n = 0
+            while True:
+                n += 1
+                root = folder / f"{i}-{call}-{n}"
+                old = commit(Store(root), 0).key
+                count.injected += 1
+                with failing(call, n, code) as calls:
+                    try:
+                        done = {commit(Store(root), 1).key}
+                    except StorageError:
+                        done = set()
+                        count.struck += 1
+                    reached = calls() >= n
+                settle(Store(root), {old} | done, count)
+                count.accepted += len(list((root / "tmp").iterdir()))
+                if not reached:
+                    count.injected -= 1
+                    break
+    return count
+
+
+def damage(folder: Path, flips: int, cuts: int, seed: int = 0) -> tuple[Count, Count]:
+    """Single bits flipped, and ends cut off, over the whole of an object: each is found when it is read."""
+    rng, flipped, cut = random.Random(seed), Count(), Count()
+    store = Store(folder / "store")
+    record = commit(store, 3)
+    path, whole = store.path(record), store.path(record).read_bytes()
+    for count, times in ((flipped, flips), (cut, cuts)):
+        for _ in range(times):
+            if count is flipped:
+                bad = bytearray(whole)
+                bad[rng.randrange(len(whole))] ^= 1 << rng.randrange(8)
+            else:
+                bad = bytearray(whole[: rng.randrange(len(whole))])
+            path.write_bytes(bad)
+            count.injected += 1
+            try:
+                store.read(record)
+                count.accepted += 1
+            except DamagedArtefactError:
+                count.struck += 1
+            subprocess.run(["rm", "-rf", str(store.root / "quarantine")], check=True)
+    path.write_bytes(whole)
+    assert good(store, record)
+    return flipped, cut
+
+
+def row(what: str, count: Count) -> None:
+    print(f"| {what} | {count.injected} | {count.struck} | {count.lost} | {count.accepted} |", flush=True)
+
+
+def main() -> None:
+    print("| fault | injected | struck | committed and lost | damage accepted |\n|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory(prefix="koop-faults-") as name:
+        work = Path(name)
+        for writers, what in ((1, "kill -9 of a writer"), (2, "kill -9 of two writers on the same keys")):
+            (work / str(writers)).mkdir()
+            row(what, kills(work / str(writers), 1000, writers))
+        for code, what in (
+            (errno.EIO, "input/output error"),
+            (errno.ENOSPC, "disk full"),
+            (errno.EDQUOT, "quota used up"),
+            (errno.EROFS, "read-only file system"),
+            (errno.EACCES, "permission denied"),
+        ):
+            row(f"{what} at the n-th open, write, fsync, rename or mkdir", errors(work / str(code), code))
+        for what, count in zip(("a bit flipped", "an end cut off"), damage(work, 3000, 2000), strict=True):
+            row(f"{what} in an object", count)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,147 @@
+"""Work shared by processes: the same results, errors told once, nothing left running."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+
+import pytest
+
+from koopcli.config.changes import parse_set
+from koopcli.config.experiment import load_experiment
+from koopcli.errors import InvalidValueError, StorageError
+from koopcli.stages import recipes
+from koopcli.stages.ahead import make_ahead
+from koopcli.stages.pipeline import Pipeline
+from koopcli.stages.workers import Workers
+from koopcli.store import Store
+from tests.stages.test_pipeline import SMALL, Listener
+
+CHUNKED = [*SMALL, "simulate.chunk=50"]
+
+
+def double(job: int) -> int:
+    return 2 * job
+
+
+def refuse(job: int) -> int:
+    raise StorageError("full")
+
+
+def end(job: int) -> int:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return job
+
+
+def interrupt(job: int) -> int:
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_every_job_is_done_once(count):
+    with Workers(count) as workers:
+        assert sorted(workers.each(double, range(20))) == [(i, 2 * i) for i in range(20)]
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_an_error_of_a_job_is_the_commands(count):
+    with pytest.raises(StorageError, match="full"), Workers(count) as workers:
+        list(workers.each(refuse, range(5)))
+
+
+def test_an_interrupt_here_is_not_swallowed():
+    with pytest.raises(KeyboardInterrupt), Workers() as workers:
+        list(workers.each(interrupt, range(5)))
+
+
+def test_a_killed_worker_is_one_clear_error():
+    with pytest.raises(InvalidValueError, match="fewer --workers"), Workers(2) as workers:
+        list(workers.each(end, range(5)))
+
+
+def test_leaving_by_an_error_stops_the_workers():
+    def go_wrong(workers):
+        next(workers.each(double, range(20)))
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError), Workers(2) as workers:
+        go_wrong(workers)
+    for process in multiprocessing.active_children():
+        process.join(10)
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.parametrize("count", [0, -1, 1000])
+def test_odd_counts_are_refused(count):
+    with pytest.raises(InvalidValueError, match="--workers"):
+        Workers(count)
+
+
+def objects(store: Store) -> dict[str, str]:
+    records = [store.record(stage, key) for stage, key in store.index()]
+    return {record.name: record.object for record in records}
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory) -> dict[str, str]:
+    """What one process makes."""
+    store = Store(tmp_path_factory.mktemp("alone"))
+    Pipeline(store, Listener()).make(recipes.evaluation(load_experiment("paper", parse_set(CHUNKED))))
+    return objects(store)
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_chunks_made_by_workers_are_the_same_to_the_last_bit(tmp_path, alone, count):
+    store, heard = Store(tmp_path), Listener()
+    with Workers(count) as workers:
+        Pipeline(store, heard, workers).make(recipes.evaluation(load_experiment("paper", parse_set(CHUNKED))))
+    assert objects(store) == alone
+    assert not list((store.root / "partial").glob("*"))
+
+
+def test_tasks_made_ahead_are_the_same_to_the_last_bit(tmp_path, alone):
+    store, heard = Store(tmp_path), Listener()
+    task = recipes.evaluation(load_experiment("paper", parse_set(CHUNKED)))
+    with Workers(2) as workers:
+        pipeline = Pipeline(store, heard, workers)
+        make_ahead(pipeline, [task])
+        assert objects(store) == alone
+        made = len(heard.notes)
+        assert sum("made in" in note for note in heard.notes) == len(alone) == made
+        pipeline.make(task)
+    assert len(heard.notes) == made  # all of it was said already
+
+
+def test_what_cannot_be_made_ahead_is_met_in_its_place(tmp_path):
+    experiment = load_experiment("paper", parse_set([*SMALL, "sample.columns=1", "sample.count=1"]))
+    bad = recipes.fit_edmd(experiment)
+    with Workers(2) as workers:
+        pipeline = Pipeline(Store(tmp_path), Listener(), workers)
+        make_ahead(pipeline, [bad])
+        with pytest.raises(InvalidValueError):
+            pipeline.make(bad)
+
+
+def test_simulations_are_resumed_chunk_by_chunk(tmp_path, alone, monkeypatch):
+    from koopcli.stages import chunks
+
+    store, real, left = Store(tmp_path), chunks.commit, 3
+
+    def breaking(chunk):
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise KeyboardInterrupt
+        return real(chunk)
+
+    task = recipes.simulation(load_experiment("paper", parse_set(CHUNKED)))
+    with monkeypatch.context() as patch:
+        patch.setattr(chunks, "commit", breaking)
+        with pytest.raises(KeyboardInterrupt):
+            Pipeline(store, Listener()).make(task)
+    heard = Listener()
+    made = Pipeline(store, heard).make(task)
+    assert "3 of 20 chunks were already there" in heard.notes
+    assert alone[made.record.name] == made.record.object

@@ -1,0 +1,29 @@
+"""Nothing that was committed is lost, and no damage is taken for good. At length: ``make faults``."""
+
+from __future__ import annotations
+
+import errno
+
+import pytest
+
+from tests.faults import damage, errors, kills
+
+
+@pytest.mark.parametrize("writers", [1, 2])
+def test_killed_writers_lose_nothing(tmp_path, writers):
+    count = kills(tmp_path, 30, writers, seed=writers)
+    assert count.struck >= 25
+    assert (count.lost, count.accepted) == (0, 0)
+
+
+@pytest.mark.parametrize("code", [errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES])
+def test_an_error_at_any_call_of_a_commit_leaves_the_old_state_or_the_new(tmp_path, code):
+    count = errors(tmp_path, code)
+    assert count.struck >= 8
+    assert (count.lost, count.accepted) == (0, 0)
+
+
+def test_every_flipped_bit_and_every_cut_is_found(tmp_path):
+    flipped, cut = damage(tmp_path, 300, 200)
+    assert (flipped.injected, flipped.struck, flipped.accepted) == (300, 300, 0)
+    assert (cut.injected, cut.struck, cut.accepted) == (200, 200, 0)
