@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import koopcli
-from koopcli.cli import looking, making, plotting, reproduce, vehicles
+from koopcli.cli import comparing, keeping, looking, making, plotting, reproduce, vehicles
 
 app = typer.Typer(
     name="koop",
@@ -23,6 +23,8 @@ reproduce.register(app)
 making.register(app)
 plotting.register(app)
 looking.register(app)
+comparing.register(app)
+keeping.register(app)
 vehicles.register(app)
 
 

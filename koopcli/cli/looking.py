@@ -1,4 +1,4 @@
-"""The commands that look into the store and after it: ls, show, path, pin, unpin."""
+"""The commands that look into the store, and what is pinned in it: ls, show, path, pin, unpin."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from koopcli.cli.invocation import brief, open_store, print_json, write_csv
+from koopcli.cli.lineage import show_lineage
 from koopcli.cli.options import JsonOption, StoreOption, complete_name
 from koopcli.console import Console, show_table
-from koopcli.errors import NewerFormatError, UnknownNameError
+from koopcli.errors import NewerFormatError, UnknownNameError, UsageError
 
 if TYPE_CHECKING:
     from koopcli.stages.base import Task
@@ -27,21 +28,37 @@ NameArgument = Annotated[
 
 def ls(
     stage: Annotated[str | None, typer.Argument(help="Only artefacts of this stage.")] = None,
+    stale: Annotated[
+        bool,
+        typer.Option(
+            "--stale",
+            help="Only what this koop would not make again under the same name, and why: its stage, its settings or "
+            "what it was made from have changed.",
+        ),
+    ] = False,
     store: StoreOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """List the artefacts of the store, oldest first.
 
-    Example: koop ls evaluate
+    Example: koop ls evaluate --stale
     """
     from koopcli.stages.registry import STAGES
-    from koopcli.store.files import size_text
+    from koopcli.store.files import printable, size_text
     from koopcli.store.pins import pins
 
     if stage is not None and stage not in STAGES:
         raise UnknownNameError(f"unknown stage '{stage}' (known: {', '.join(STAGES)})")
     console, shelf = open_store(store)
-    records = _records(shelf, stage, console)
+    records = _records(shelf, None if stale else stage, console)
+    why = {}
+    if stale:
+        from koopcli.stages import stale as staleness
+
+        why = staleness.stale({f"{record.stage}/{record.key}": record for record in records})
+        records = [
+            record for record in records if f"{record.stage}/{record.key}" in why and stage in (None, record.stage)
+        ]
     labels: dict[str, list[str]] = {}
     for label, names in pins(shelf).items():
         for name in names:
@@ -55,6 +72,7 @@ def ls(
             "object": shelf.has_object(record),
             "pins": labels.get(f"{record.stage}/{record.key}", []),
             "settings": record.recipe["settings"],
+            **({"why": why[f"{record.stage}/{record.key}"]} if stale else {}),
         }
         for record in records
     ]
@@ -68,18 +86,24 @@ def ls(
             row["made"].replace("T", " ")[:16],
             " ".join(row["pins"]),
             brief(row["settings"]),
+            *([row["why"]] if stale else []),
             f"{row['seconds']:.1f} s",
             size_text(row["bytes"]) if row["object"] else "missing",
         ]
         for row in rows
     ]
-    show_table(["artefact", "made (UTC)", "pinned as", "settings", "took", "size"], table, left=4)
+    table = [[printable(cell) for cell in row] for row in table]
+    header = ["artefact", "made (UTC)", "pinned as", "settings", *(["why stale"] if stale else []), "took", "size"]
+    show_table(header, table, left=len(header) - 2)
 
 
 def show(
     name: NameArgument,
     as_csv: Annotated[
         bool, typer.Option("--csv", help="The table of an evaluation or the numbers of a figure.")
+    ] = False,
+    lineage: Annotated[
+        bool, typer.Option("--lineage", help="What it was made from, and that in turn, as a tree; makes nothing.")
     ] = False,
     store: StoreOption = None,
     as_json: JsonOption = False,
@@ -88,6 +112,13 @@ def show(
 
     Example: koop show evaluate/3f2a --csv > scores.csv
     """
+    from koopcli.store.files import printable
+
+    if lineage:
+        if as_csv:
+            raise UsageError("--csv and --lineage are two ways to show an artefact: choose one")
+        show_lineage(name, store, as_json)
+        return
     artefact, task, path = _obtain(name, store)
     if as_csv:
         if not hasattr(artefact.content, "table"):
@@ -111,9 +142,9 @@ def show(
         print_json(full)
         return
     for heading, facts in _sections(full):
-        print(heading)
+        print(printable(heading))
         for key, text in _rows(facts):
-            print(f"  {key:<24} {text}")
+            print(printable(f"  {key:<24} {text}"))
 
 
 def path(name: NameArgument, store: StoreOption = None) -> None:

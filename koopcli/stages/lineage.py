@@ -1,0 +1,46 @@
+"""What an artefact was made from, as its records tell: nothing is read of its content, and nothing made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from koopcli.errors import NewerFormatError
+from koopcli.store import Record, Store
+
+
+@dataclass(frozen=True)
+class Ancestor:
+    """An artefact, what it is to the one made from it, and its own inputs. ``state``: present, missing or gone.
+
+    The object of a missing one is not there, but its record; of one that is gone not even that.
+    """
+
+    role: str
+    full: str
+    record: Record | None
+    state: str
+    inputs: tuple[Ancestor, ...] = ()
+
+    def behind(self, roles: str = "") -> Iterator[tuple[str, Record]]:
+        """This artefact's record and all behind it, each with the roles that lead to it."""
+        if self.record is not None:
+            yield roles, self.record
+        for one in self.inputs:
+            yield from one.behind(f"{roles} / {one.role}".removeprefix(" / "))
+
+
+def lineage(record: Record, store: Store, role: str = "") -> Ancestor:
+    """``record`` with everything that it was made from, as far as it is in the store."""
+    inputs = tuple(_input(store, role, full) for role, full in record.lineage.items())
+    state = "present" if store.has_object(record) else "missing"
+    return Ancestor(role, f"{record.stage}/{record.key}", record, state, inputs)
+
+
+def _input(store: Store, role: str, full: str) -> Ancestor:
+    stage, _, key = full.partition("/")
+    try:
+        record = store.record(stage, key)
+    except NewerFormatError:
+        return Ancestor(role, full, None, "of a newer format")
+    return Ancestor(role, full, None, "gone") if record is None else lineage(record, store, role)

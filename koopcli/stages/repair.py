@@ -1,0 +1,159 @@
+"""Mend a store: put damaged files aside, and make again what is lost where its recipe is known."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from koopcli.errors import (
+    DamagedArtefactError,
+    InvalidValueError,
+    KoopError,
+    NewerFormatError,
+    UnknownNameError,
+    UsageError,
+)
+from koopcli.records import Packed
+from koopcli.stages.base import Reporter, Task
+from koopcli.stages.pipeline import Pipeline
+from koopcli.stages.recorded import recipe_of
+from koopcli.stages.registry import STAGES
+from koopcli.store import Record, Store
+from koopcli.store.files import UntrustedFileError, open_regular, read_small
+from koopcli.store.identity import key_of
+from koopcli.store.survey import look, records
+from koopcli.store.verify import Finding
+
+# Others, such as a full disk, concern more than one artefact.
+HOPELESS = (DamagedArtefactError, NewerFormatError, InvalidValueError, UnknownNameError, UsageError)
+
+
+def opens(record: Record, packed: Packed) -> tuple[str, str] | None:
+    """What keeps the content of ``record`` from being unpacked by its stage: a kind of finding and why, or None."""
+    stage = STAGES.get(record.stage)
+    if stage is None:
+        return "newer format", "of a stage that this koop does not have: update koop"
+    try:
+        stage.unpack(packed)
+    except (KeyError, TypeError, ValueError, KoopError) as error:
+        written, here = record.recipe["version"], stage.version
+        if written != here:
+            return "other version", f"laid out by version {written} of its stage, here {here}: make it afresh"
+        return "damaged object", f"does not unpack ({' '.join(str(error).split())[:80]})"
+    return None
+
+
+def repair(store: Store, reporter: Reporter, findings: Sequence[Finding]) -> list[Finding]:
+    """Repair what can be; returns the findings, each saying whether it was.
+
+    A damaged record whose recipe still hashes to its name is made again too. A damaged pin stays: without it, what it
+    kept would look like something nobody wants.
+    """
+    lost = _put_aside(store, findings)
+    pipeline = Pipeline(store, reporter)
+    done = _make_lost(pipeline, lost)
+    again = ("damaged object", "missing object")
+    done |= {one.artefact for one in findings if one.kind in again and one.artefact and _make(pipeline, one.artefact)}
+    mended = {one for one in findings if one.artefact in done and one.damage}
+    mended |= {one for one in findings if one.kind == "damaged object" and not one.artefact}
+    return [replace(one, repaired=one in mended) for one in findings]
+
+
+@dataclass(frozen=True, eq=False)
+class _Lost:
+    """An artefact whose record is damaged but for its recipe."""
+
+    full: str
+    recipe: dict[str, Any]
+
+
+def _put_aside(store: Store, findings: Sequence[Finding]) -> list[_Lost]:
+    """Move damaged files away; returns the recipes in damaged records that are still what their names say."""
+    lost = []
+    for path in dict.fromkeys(one.path for one in findings if one.kind in ("damaged record", "damaged object")):
+        file = store.root / path
+        if not _still_damaged(file):
+            continue
+        if path.startswith("records/") and (recipe := _recipe(file)) is not None:
+            lost.append(_Lost(f"{file.parent.name}/{file.stem}", recipe))
+        store.put_aside(file)
+    return lost
+
+
+def _still_damaged(path: Path) -> bool:
+    """Whether another process has not mended a file since it was found; nor is one whose bytes are right put aside."""
+    if not os.path.lexists(path):
+        return False
+    if path.suffix == ".json":
+        found = look(path, path.parent.name, path.stem)
+        return found is not None and found.damaged
+    try:
+        with open_regular(path) as (file, _):
+            return hashlib.file_digest(file, "sha256").hexdigest() != path.stem
+    except FileNotFoundError:
+        return False
+    except (OSError, UntrustedFileError):
+        return True
+
+
+def _recipe(path: Path) -> dict[str, Any] | None:
+    """The recipe in a damaged record, if it hashes to the record's name."""
+    try:
+        recipe = json.loads(read_small(path))["recipe"]
+        good = key_of(recipe) == path.stem and recipe["stage"] == path.parent.name and recipe["stage"] in STAGES
+        return dict(recipe) if good else None
+    except (
+        OSError,
+        UntrustedFileError,
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+        InvalidValueError,
+    ):
+        return None
+
+
+def _make_lost(pipeline: Pipeline, lost: Sequence[_Lost]) -> set[str]:
+    """Make what has lost its record, as soon as all that it is made from is there; returns what was made."""
+    done: set[_Lost] = set()
+    while True:
+        there = (one.record for one in records(pipeline.store.root).values()) if set(lost) - done else ()
+        known = {record.data: record for record in there if record is not None}
+        made = {one for one in lost if one not in done and _make_from(pipeline, one, known)}
+        done |= made
+        if not made:
+            return {one.full for one in done}
+
+
+def _make_from(pipeline: Pipeline, lost: _Lost, known: dict[str, Record]) -> bool:
+    inputs = {role: known.get(data) for role, data in lost.recipe["inputs"].items()}
+    there = {role: record for role, record in inputs.items() if record is not None}
+    if len(there) < len(inputs):
+        return False
+    try:
+        settings = STAGES[lost.recipe["stage"]].settings(lost.recipe["settings"])
+        named = tuple((role, pipeline.named(f"{one.stage}/{one.key}")) for role, one in there.items())
+        task = Task(lost.recipe["stage"], settings, named)
+        if f"{task.stage}/{key_of(recipe_of(task, there))}" != lost.full:  # another version made it
+            return False
+        made = pipeline.make(task).record
+    except (*HOPELESS, KeyError, TypeError) as error:
+        pipeline.reporter.warn(str(error))
+        return False
+    return f"{made.stage}/{made.key}" == lost.full
+
+
+def _make(pipeline: Pipeline, full: str) -> bool:
+    try:
+        pipeline.make(pipeline.named(full))
+    except HOPELESS as error:
+        pipeline.reporter.warn(str(error))
+        return False
+    return True

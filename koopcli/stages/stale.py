@@ -1,0 +1,82 @@
+"""Which artefacts today's koop would not make again under the same key, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from koopcli.config.changes import flat
+from koopcli.errors import KoopError, NewerFormatError
+from koopcli.figures import source_digest
+from koopcli.stages.base import Task
+from koopcli.stages.recorded import recipe_of, settings_of
+from koopcli.stages.registry import STAGES
+from koopcli.store import Record
+from koopcli.store.identity import canonical, key_of, plain
+
+
+def stale(records: Mapping[str, Record]) -> dict[str, str]:
+    """full name -> why, of those among ``records`` (all of a store, by full name) that are stale."""
+    judge = _Judge(records)
+    return {full: why for full in records if (why := judge.why(full)) is not None}
+
+
+class _Judge:
+    """Judges each record once, its inputs first."""
+
+    def __init__(self, records: Mapping[str, Record]) -> None:
+        self._records = records
+        self._judged: dict[str, str | None] = {}
+
+    def why(self, full: str) -> str | None:
+        """Why the artefact ``full`` is stale, or None."""
+        if full not in self._judged:
+            self._judged[full] = None
+            self._judged[full] = "; ".join(self._reasons(self._records[full])) or None
+        return self._judged[full]
+
+    def _reasons(self, record: Record) -> Iterator[str]:
+        stage = STAGES.get(record.stage)
+        if stage is None:
+            yield f"this koop has no stage {record.stage}"
+            return
+        own = list(_own_reasons(record, stage.version))
+        yield from own
+        inputs = {}
+        for role, full in record.lineage.items():
+            there = self._records.get(full)
+            if there is None:
+                yield f"its {role}, {full.partition('/')[0]}, is gone"
+            elif there.data != record.recipe["inputs"].get(role):
+                yield f"its {role} has come out different since"
+            elif self.why(full) is not None:
+                yield f"its {role} is stale"
+            else:
+                inputs[role] = there
+        if not own and len(inputs) == len(record.lineage):
+            task = Task(record.stage, settings_of(record))
+            if key_of(recipe_of(task, inputs)) != record.key:
+                yield "its recipe is written differently here"
+
+
+def _own_reasons(record: Record, version: int) -> Iterator[str]:
+    """Why an artefact is stale whatever it was made from."""
+    written = record.recipe["version"]
+    if written != version:
+        yield f"version {written} of its stage, here {version}"
+    try:
+        here = dict(flat(plain(settings_of(record))))
+    except NewerFormatError as error:
+        cause = error.__cause__
+        yield f"settings that are no longer known ({cause if isinstance(cause, KoopError) else 'one is missing'})"
+        return
+    there = dict(flat(record.recipe["settings"]))
+    changed = sorted(name for name in here.keys() | there.keys() if not _same(here, there, name))
+    if changed:
+        yield f"settings that are written differently here: {', '.join(changed)}"
+    if "drawn_by" in here and here["drawn_by"] != source_digest():
+        yield "drawn by other code"
+
+
+def _same(here: Mapping[str, Any], there: Mapping[str, Any], name: str) -> bool:
+    return name in here and name in there and canonical(here[name]) == canonical(there[name])

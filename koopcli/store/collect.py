@@ -1,0 +1,293 @@
+"""Find and remove what nobody keeps. No lock: whoever commits or reads at the same time loses nothing committed.
+
+A record is removed before its object, and an object is moved away, looked for in the records once more, and put back
+if one names it; :meth:`Store.commit` looks after its object once more when its record is there. Whichever of the two
+comes last finds the other's work.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+import socket
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from koopcli.errors import DamagedArtefactError, StorageError
+from koopcli.progress import Progress, silent
+from koopcli.store.files import DAY, HOUR, make_folder, printable, storage_errors
+from koopcli.store.locks import if_free
+from koopcli.store.store import Store
+from koopcli.store.survey import DIGEST, File, Recorded, Survey, look, object_path, pinned, records, survey
+
+NAMES = re.compile(rf"(?<![0-9a-f]){DIGEST}(?![0-9a-f])".encode())
+
+
+@dataclass(frozen=True)
+class Removal:
+    """Something that nobody keeps: ``name`` of an artefact, else a path; ``size`` is what removing it frees.
+
+    ``files`` are removed one after another; ``objects`` are removed after all records.
+    """
+
+    kind: str
+    name: str
+    size: int
+    files: tuple[File, ...]
+    objects: tuple[str, ...] = ()
+    key: str = ""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a collection removes; ``kept`` artefacts stay. ``clock`` says how the age of files was measured."""
+
+    removals: tuple[Removal, ...]
+    kept: int
+    there: Survey = field(repr=False)
+    clock: str = ""
+
+    @property
+    def size(self) -> int:
+        """Bytes that are freed."""
+        return sum(one.size for one in self.removals)
+
+
+def plan(store: Store, grace: float, *, delete: bool = False, progress: Progress = silent) -> Plan:
+    """What is neither pinned nor younger than ``grace`` seconds, nor was used to make any such thing.
+
+    Raises ``DamagedArtefactError`` for a damaged pin, as nobody knows what it keeps.
+    """
+    there = survey(store.root, progress)
+    damaged = [printable(label) for label, names in there.pins.items() if names is None]
+    if damaged:
+        raise DamagedArtefactError(
+            f"the pin {damaged[0]} is damaged and what it keeps unknown, so nothing is removed: "
+            f"koop unpin {damaged[0]}, and pin again what is to stay"
+        )
+    if not any((there.objects, there.removing, there.records, there.chunks, there.locks, there.temporary)):
+        return Plan((), 0, there)
+    now, clock = _clock(store, there, delete)
+    kept = _kept(there, now - grace)
+    removals = [
+        *_artefacts(store, there, kept, now - max(grace, HOUR)),
+        *_unfinished(store, there, now - grace),
+        *(
+            Removal("temporary file", _relative(store, file), file.size, (file,))
+            for file in there.temporary
+            if now - file.mtime > DAY
+        ),
+        *(
+            Removal("lock", _relative(store, file), file.size, (file,))
+            for file in there.locks
+            if now - file.mtime >= max(grace, HOUR) and _free(file.path)
+        ),
+    ]
+    return Plan(tuple(removals), len(kept), there, clock)
+
+
+def remove(store: Store, planned: Plan, progress: Progress = silent) -> list[Removal]:
+    """Remove what was planned, but for what is wanted or in use meanwhile; returns what was removed."""
+    done: list[Removal] = []
+    waiting: list[Removal] = []
+    with storage_errors(store.root):
+        _put_back(store, planned.there)
+        for i, one in enumerate(planned.removals):
+            progress(i, len(planned.removals))
+            if one.kind == "orphan object":
+                waiting.append(one)
+            elif one.kind == "artefact":
+                if _remove_record(store, one, planned.there):
+                    waiting.append(one)
+            elif _remove_files(store, one):
+                done.append(one)
+        left = _remove_objects(store, {digest for one in waiting for digest in one.objects}, planned.there)
+    for one in waiting:
+        if not left & set(one.objects):
+            done.append(one)
+        elif one.kind == "artefact":  # somebody has committed equal data
+            done.append(replace(one, size=one.files[0].size))
+    return done
+
+
+def _kept(there: Survey, before: float) -> set[str]:
+    """Full names of what is pinned or young, and of all that it was made from. What does not read here is kept.
+
+    What was made again is as young as its object, whatever the age of its record.
+    """
+    waiting = [name for names in there.pins.values() for name in names or []]
+    for full, one in there.records.items():
+        file = there.objects.get(one.record.object) if one.record is not None else None
+        if one.record is None or max(one.file.mtime, file.mtime if file else 0.0) > before:
+            waiting.append(full)
+    return _closure(there.records, waiting)
+
+
+def _closure(known: dict[str, Recorded], waiting: Sequence[str]) -> set[str]:
+    by_key = {one.key: full for full, one in known.items()}
+    found: set[str] = set()
+    left = list(waiting)
+    while left:
+        one = known.get(left.pop())
+        if one is not None and one.full not in found:
+            found.add(one.full)
+            if one.record is not None:
+                left += one.record.lineage.values()
+            else:
+                left += [by_key[key] for key in _named(one) if key in by_key]
+    return found
+
+
+def _named(one: Recorded) -> set[str]:
+    """Every digest and key that a record names, in any format."""
+    if one.record is not None:
+        return {one.record.object}
+    return {text.decode() for text in NAMES.findall(one.text)}
+
+
+def _artefacts(store: Store, there: Survey, kept: set[str], before: float) -> Iterator[Removal]:
+    """Records that nobody keeps, each with its object once no other record names it; then objects without any."""
+    wanted = {digest for full in kept for digest in _named(there.records[full])}
+    freed: set[str] = set()
+    for full in sorted(there.records.keys() - kept):
+        one = there.records[full]
+        if one.record is None:
+            continue
+        digest = one.record.object
+        file = there.objects.get(digest) if digest not in wanted | freed else None
+        size = one.file.size + (file.size if file else 0)
+        freed |= {digest} if file else set()
+        yield Removal("artefact", one.record.name, size, (one.file,), (digest,) if file else (), full)
+    if any(one.record is None for one in there.records.values()):
+        return  # what looks like an orphan may belong to a record that does not read here
+    used = wanted | there.named_by().keys()
+    for digest, file in there.objects.items():
+        if digest not in used and file.mtime < before:
+            yield Removal("orphan object", _relative(store, file), file.size, (file,), (digest,))
+
+
+def _unfinished(store: Store, there: Survey, before: float) -> Iterator[Removal]:
+    """Chunks of what nobody has gone on with."""
+    for key, files in there.chunks.items():
+        if all(file.mtime <= before for file in files) and _free(store.root / "locks" / f"{key}.lock"):
+            yield Removal("chunks", f"partial/{key}", sum(file.size for file in files), tuple(files), key=key)
+
+
+def _clock(store: Store, there: Survey, delete: bool) -> tuple[float, str]:
+    """Now, by the file system that gave the files their times, and how it was found where not in the usual way."""
+    temporary = store.root / "tmp"
+    probe = temporary / _own()
+    try:
+        with storage_errors(temporary):
+            make_folder(temporary)
+            try:
+                os.close(os.open(probe, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+                return probe.stat().st_mtime, ""
+            finally:
+                probe.unlink(missing_ok=True)
+    except StorageError:
+        if delete:
+            raise
+        return there.newest(), "the store is read-only: ages are counted from the newest file in it"
+
+
+def _remove_record(store: Store, one: Removal, there: Survey) -> bool:
+    """Remove the record of an artefact, unless it was pinned, made again or used meanwhile."""
+    pins = pinned(store.root)
+    (file,) = one.files
+    stage, _, key = one.key.partition("/")
+    now = look(file.path, stage, key)
+    if now is None or now.file != file or any(names is None for names in pins.values()):
+        return False
+    if now.record is not None and not _untouched(store, now.record.object, there):
+        return False
+    wanted = [name for names in pins.values() for name in names or []]
+    if one.key in _closure(there.records, wanted):
+        return False
+    try:
+        file.path.unlink()
+    except FileNotFoundError:
+        return False
+    return True
+
+
+def _remove_files(store: Store, one: Removal) -> bool:
+    """Remove litter, while nobody holds the lock that it is or belongs to."""
+    if one.kind == "temporary file":
+        one.files[0].path.unlink(missing_ok=True)
+        return True
+    lock = one.files[0].path
+    if one.kind == "chunks":
+        lock = store.root / "locks" / f"{one.key}.lock"
+        make_folder(lock.parent)
+        lock.touch()  # so that it can be held
+    with if_free(lock) as free:
+        if free:
+            for file in one.files:
+                file.path.unlink(missing_ok=True)
+            lock.unlink(missing_ok=True)
+    if one.kind == "chunks" and free:
+        with suppress(OSError):  # somebody has gone on with it
+            one.files[0].path.parent.rmdir()
+    return free
+
+
+def _remove_objects(store: Store, digests: set[str], there: Survey) -> set[str]:
+    """Remove objects that no record names; returns those that are still there."""
+    away: dict[str, Path] = {}
+    suffix = _own()
+    for digest in sorted(digests):
+        path = object_path(store.root, digest)
+        with suppress(FileNotFoundError):
+            if _untouched(store, digest, there):
+                aside = path.with_name(f"{path.name}.{suffix}")
+                os.replace(path, aside)
+                away[digest] = aside
+    _settle(store, away)
+    return {digest for digest in digests if object_path(store.root, digest).exists()}
+
+
+def _untouched(store: Store, digest: str, there: Survey) -> bool:
+    """Whether an object is as it was when it was looked at; one that somebody has put again is young."""
+    try:
+        about = object_path(store.root, digest).lstat()
+    except FileNotFoundError:
+        return digest not in there.objects
+    then = there.objects.get(digest)
+    return then is not None and (about.st_size, about.st_mtime) == (then.size, then.mtime)
+
+
+def _settle(store: Store, away: dict[str, Path]) -> None:
+    """Put objects that were moved away back where a record names them, and remove the others."""
+    if not away:
+        return
+    named = {digest for one in records(store.root).values() for digest in _named(one)}
+    for digest, aside in away.items():
+        with suppress(FileNotFoundError):
+            if digest in named:
+                os.replace(aside, object_path(store.root, digest))
+            else:
+                aside.unlink()
+
+
+def _put_back(store: Store, there: Survey) -> None:
+    """End what a collection that was cut off had begun; one that is still at work meets nothing it does not expect."""
+    for digest, file in there.removing:
+        _settle(store, {digest: file.path})
+
+
+def _free(lock: Path) -> bool:
+    with if_free(lock) as free:
+        return free
+
+
+def _own() -> str:
+    """A name that no other process gives to a file."""
+    return f"{os.getpid()}-{secrets.token_hex(8)}@{socket.gethostname()}"
+
+
+def _relative(store: Store, file: File) -> str:
+    return file.path.relative_to(store.root).as_posix()

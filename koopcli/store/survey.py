@@ -1,0 +1,203 @@
+"""What lies in a store, looked at without touching it: nothing is moved, written or locked."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from koopcli.errors import NewerFormatError
+from koopcli.progress import Progress, silent
+from koopcli.store.files import UntrustedFileError, read_small, reading_errors
+from koopcli.store.records import STAGE, BadRecordError, Record, is_name
+
+DIGEST = "[0-9a-f]{64}"
+WRITER = r"\d+-[0-9a-f]{16}@.+"  # the process that writes or removes a file
+RECORD = re.compile(rf"({DIGEST})\.json")
+OBJECT = re.compile(rf"({DIGEST})\.h5")
+REMOVING = re.compile(rf"({DIGEST})\.h5\.{WRITER}")
+CHUNK = re.compile(rf"\d+-{DIGEST}\.h5")
+FOLDERS = ("objects", "records", "partial", "refs", "locks", "tmp", "quarantine", "reports")
+BESIDE = ("README.md", ".gitignore")  # what a checkout keeps in its store
+
+
+@dataclass(frozen=True)
+class File:
+    """A file as it was when it was looked at."""
+
+    path: Path
+    size: int
+    mtime: float
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A file among the records: its ``record``, or the ``text`` of one that is ``damaged`` or of a newer format."""
+
+    file: File
+    stage: str
+    key: str
+    record: Record | None
+    damaged: bool = False
+    text: bytes = b""
+
+    @property
+    def full(self) -> str:
+        """The artefact's full name."""
+        return f"{self.stage}/{self.key}"
+
+
+@dataclass
+class Survey:
+    """Every file of a store by what it is, as its name says."""
+
+    objects: dict[str, File] = field(default_factory=dict)
+    removing: list[tuple[str, File]] = field(default_factory=list)
+    records: dict[str, Recorded] = field(default_factory=dict)
+    chunks: dict[str, list[File]] = field(default_factory=dict)
+    pins: dict[str, list[str] | None] = field(default_factory=dict)
+    """label -> full names, or None for one that does not read"""
+    locks: list[File] = field(default_factory=list)
+    temporary: list[File] = field(default_factory=list)
+    quarantine: list[File] = field(default_factory=list)
+    foreign: list[File] = field(default_factory=list)
+
+    def named_by(self) -> dict[str, list[Recorded]]:
+        """digest -> the readable records that name this object."""
+        found: dict[str, list[Recorded]] = {}
+        for one in self.records.values():
+            if one.record is not None:
+                found.setdefault(one.record.object, []).append(one)
+        return found
+
+    def newest(self) -> float:
+        """The latest time of any object or record, 0 in an empty store."""
+        files = [*self.objects.values(), *(one.file for one in self.records.values())]
+        return max((file.mtime for file in files), default=0.0)
+
+
+def survey(root: Path, progress: Progress = silent) -> Survey:
+    """Everything in the store at ``root``. Objects come before records: what is committed meanwhile is not missed."""
+    found = Survey()
+    with reading_errors(root):
+        for entry in _entries(root, top=True):
+            if entry.name not in BESIDE and not (entry.name in FOLDERS and entry.is_dir(follow_symlinks=False)):
+                _add(found.foreign, entry)
+        _objects(root, found)
+        found.records = records(root, found.foreign, progress)
+        for entry in _entries(root / "partial"):
+            inner = list(_entries(Path(entry.path))) if re.fullmatch(DIGEST, entry.name) else [entry]
+            for one in inner:
+                fits = one is not entry and CHUNK.fullmatch(one.name)
+                _add(found.chunks.setdefault(entry.name, []) if fits else found.foreign, one)
+        found.pins = pinned(root, found.foreign)
+        for name, files, pattern in (
+            ("locks", found.locks, rf"{DIGEST}\.lock"),
+            ("tmp", found.temporary, WRITER),
+            ("quarantine", found.quarantine, ".*"),
+        ):
+            for entry in _entries(root / name):
+                _add(files if re.fullmatch(pattern, entry.name, re.S) else found.foreign, entry)
+    return found
+
+
+def records(root: Path, foreign: list[File] | None = None, progress: Progress = silent) -> dict[str, Recorded]:
+    """full name -> the file of a record; what is none goes to ``foreign``."""
+    found: dict[str, Recorded] = {}
+    strange: list[File] = [] if foreign is None else foreign
+    stages = list(_entries(root / "records"))
+    for i, stage in enumerate(stages):
+        if not STAGE.fullmatch(stage.name) or not stage.is_dir(follow_symlinks=False):
+            _add(strange, stage)
+            continue
+        entries = list(_entries(Path(stage.path)))
+        for j, entry in enumerate(entries):
+            progress(int(1000 * (i + j / len(entries))), 1000 * len(stages))
+            match = RECORD.fullmatch(entry.name)
+            if not match or entry.is_dir():
+                _add(strange, entry)
+            elif (one := look(Path(entry.path), stage.name, match[1])) is not None:
+                found[one.full] = one
+    return found
+
+
+def object_path(root: Path, digest: str) -> Path:
+    """Where the object ``digest`` lies, if it does."""
+    return root / "objects" / digest[:2] / f"{digest}.h5"
+
+
+def look(path: Path, stage: str, key: str) -> Recorded | None:
+    """The record at ``path`` as it stands, None when it is gone."""
+    try:
+        about = path.lstat()
+        text = read_small(path)
+    except FileNotFoundError:
+        return None
+    except UntrustedFileError:
+        return Recorded(File(path, about.st_size, about.st_mtime), stage, key, None, True)
+    file = File(path, about.st_size, about.st_mtime)
+    try:
+        return Recorded(file, stage, key, Record.from_json(text, stage, key))
+    except BadRecordError:
+        return Recorded(file, stage, key, None, True, text)
+    except NewerFormatError:
+        return Recorded(file, stage, key, None, False, text)
+
+
+def pinned(root: Path, foreign: list[File] | None = None) -> dict[str, list[str] | None]:
+    """label -> the full names that a pin keeps, None for a pin that does not read."""
+    found: dict[str, list[str] | None] = {}
+    for entry in _entries(root / "refs"):
+        if not entry.name.endswith(".json"):
+            _add([] if foreign is None else foreign, entry)
+            continue
+        found[entry.name.removesuffix(".json")] = _pin(Path(entry.path))
+    return found
+
+
+def _pin(path: Path) -> list[str] | None:
+    try:
+        names = json.loads(read_small(path))["names"]
+        return names if isinstance(names, list) and all(map(is_name, names)) else None
+    except (OSError, UntrustedFileError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
+def _objects(root: Path, found: Survey) -> None:
+    for folder in _entries(root / "objects"):
+        if not folder.is_dir(follow_symlinks=False):
+            _add(found.foreign, folder)
+            continue
+        for entry in _entries(Path(folder.path)):
+            match, leaving = OBJECT.fullmatch(entry.name), REMOVING.fullmatch(entry.name)
+            files: list[File] = []
+            if entry.is_dir() or not entry.name.startswith(folder.name) or not (match or leaving):
+                _add(found.foreign, entry)
+            elif _add(files, entry):
+                if match:
+                    found.objects[match[1]] = files[0]
+                elif leaving:
+                    found.removing.append((leaving[1], files[0]))
+
+
+def _add(files: list[File], entry: os.DirEntry[str]) -> bool:
+    """Add what ``entry`` is now, unless it has gone meanwhile."""
+    try:
+        about = entry.stat(follow_symlinks=False)
+    except FileNotFoundError:
+        return False
+    files.append(File(Path(entry.path), about.st_size, about.st_mtime))
+    return True
+
+
+def _entries(folder: Path, top: bool = False) -> Iterator[os.DirEntry[str]]:
+    """What is in ``folder``, by name; nothing where there is no such folder, or a link in its place."""
+    try:
+        with os.scandir(folder) as entries:
+            found = sorted(entries, key=lambda entry: entry.name)
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    yield from (entry for entry in found if top or not folder.is_symlink())

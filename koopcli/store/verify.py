@@ -1,0 +1,188 @@
+"""Look for damage in a store, without touching it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from koopcli.progress import Progress, silent
+from koopcli.records import Packed
+from koopcli.store.files import HOUR, UntrustedFileError, open_regular, sha256_file, size_text
+from koopcli.store.records import SHORT, Record
+from koopcli.store.store import Store
+from koopcli.store.survey import Recorded, Survey, object_path, survey
+
+DAMAGE = (
+    "damaged record",
+    "damaged object",
+    "unreadable object",
+    "missing object",
+    "damaged pin",
+    "pin of nothing",
+)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that is not as the store would have it; of the kinds in ``DAMAGE`` something committed is lost.
+
+    ``path`` is relative to the store; ``artefact`` is the full name of the one concerned, where there is one.
+    """
+
+    kind: str
+    path: str
+    what: str
+    artefact: str = ""
+    repaired: bool = False
+
+    @property
+    def name(self) -> str:
+        """The artefact's name, as commands print it."""
+        stage, _, key = self.artefact.partition("/")
+        return f"{stage}/{key[:SHORT]}" if key else ""
+
+    @property
+    def damage(self) -> bool:
+        """Whether something committed is lost."""
+        return self.kind in DAMAGE
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was found among ``checked`` artefacts, of whose objects ``read`` bytes were read."""
+
+    checked: int
+    read: int
+    unfinished: int
+    quarantine: int
+    findings: tuple[Finding, ...]
+
+
+Opens = Callable[[Record, Packed], tuple[str, str] | None]
+"""Whether the content of a record, whose bytes are right, unpacks: None, or a kind of finding and why not."""
+
+
+def verify(store: Store, opens: Opens | None, progress: Progress = silent) -> Report:
+    """Check every record, and every object against it; with ``opens`` every byte of the objects too."""
+    there = survey(store.root)
+    objects = _Objects(store, there, opens, progress)
+    findings = [*_records(store, there), *objects.check(), *_pins(store, there), *_beside(store, there)]
+    return Report(len(there.records), objects.read, len(there.chunks), len(there.quarantine), tuple(findings))
+
+
+def _records(store: Store, there: Survey) -> Iterator[Finding]:
+    for full, one in there.records.items():
+        path = _relative(store, one.file.path)
+        if one.record is None and one.damaged:
+            yield Finding("damaged record", path, "does not match its own check or its name", full)
+        elif one.record is None:
+            yield Finding("newer format", path, "written by a newer koop; left alone: update koop", full)
+        else:
+            for role, name in one.record.lineage.items():
+                if name not in there.records:
+                    yield Finding("input gone", path, f"its {role}, {_short(name)}, is no longer here", full)
+
+
+@dataclass
+class _Objects:
+    store: Store
+    there: Survey
+    opens: Opens | None
+    progress: Progress
+    read: int = 0
+
+    def check(self) -> Iterator[Finding]:
+        """Findings about the objects, missing ones included."""
+        users = self.there.named_by()
+        total = max(1, sum(file.size for file in self.there.objects.values()))
+        done = 0
+        for digest in sorted(users.keys() | self.there.objects):
+            file = self.there.objects.get(digest)
+            yield from self._check(digest, users.get(digest, []))
+            done += file.size if file else 0
+            self.progress(done, total)
+
+    def _check(self, digest: str, users: list[Recorded]) -> Iterator[Finding]:
+        path = object_path(self.store.root, digest)
+        shown = _relative(self.store, path)
+        for one in users:
+            found = self._problem(lambda one=one: self._used(one), one.file.path.exists)  # type: ignore[misc]
+            if found is not None:
+                yield Finding(found[0], shown, found[1], one.full)
+        if not users:
+            found = self._problem(lambda: self._unused(path, digest), lambda: False)
+            if found is not None:
+                yield Finding(found[0], shown, found[1])
+
+    def _problem(
+        self, look: Callable[[], tuple[str, str] | None], expected: Callable[[], bool]
+    ) -> tuple[str, str] | None:
+        """What ``look`` finds or meets; a missing file is none where it is no longer ``expected``."""
+        try:
+            return look()
+        except FileNotFoundError:
+            return ("missing object", "its record is there, its data are not") if expected() else None
+        except PermissionError:
+            return "unreadable object", "permission denied: mend its permissions"
+        except UntrustedFileError as error:
+            return "damaged object", str(error)
+        except OSError as error:
+            return "damaged object", f"cannot be read: {error.strerror or error}"
+
+    def _used(self, one: Recorded) -> tuple[str, str] | None:
+        assert one.record is not None, "it names an object"
+        if self.opens is None:
+            with open_regular(self.store.path(one.record)) as (_, size):
+                if size != one.record.size:
+                    return "damaged object", f"has {size:,} bytes, not {one.record.size:,}"
+            return None
+        self.read += one.record.size
+        return self.opens(one.record, self.store.inspect(one.record))
+
+    def _unused(self, path: Path, digest: str) -> tuple[str, str]:
+        with open_regular(path) as (_, size):
+            if self.opens is not None:
+                self.read += size
+                if sha256_file(path) != digest:
+                    return "damaged object", "its bytes do not match its name; no record names it"
+        return "orphan object", f"{size_text(size)} that no record names: see koop gc"
+
+
+def _pins(store: Store, there: Survey) -> Iterator[Finding]:
+    for label, names in there.pins.items():
+        path = f"refs/{label}.json"
+        if names is None:
+            yield Finding("damaged pin", path, f"does not say what it keeps: koop unpin {label}, and pin again")
+        for name in names or []:
+            if name not in there.records:
+                what = f"keeps {_short(name)}, which is gone: make it again, or koop unpin {label}"
+                yield Finding("pin of nothing", path, what, name)
+
+
+def _beside(store: Store, there: Survey) -> Iterator[Finding]:
+    """What is no artefact: litter, chunks of what is finished, and what nobody here has written."""
+    users = there.named_by()
+    finished = {one.key: one.full for digest in users.keys() & there.objects.keys() for one in users[digest]}
+    for key, files in there.chunks.items():
+        if key in finished:
+            what = f"{len(files)} chunks of a finished artefact: the next command clears them"
+            yield Finding("orphan chunks", f"partial/{key}", what, finished[key])
+    for _, file in there.removing:
+        yield Finding("half-removed object", _relative(store, file.path), "a `koop gc` was cut off here: run it again")
+    now = max(time.time(), there.newest())  # only to tell a file at work from litter
+    for file in there.temporary:
+        if now - file.mtime > HOUR:
+            yield Finding("temporary file", _relative(store, file.path), "left by a process that was cut off")
+    for file in there.foreign:
+        yield Finding("foreign file", _relative(store, file.path), "not written by koop; left alone")
+
+
+def _short(full: str) -> str:
+    stage, _, key = full.partition("/")
+    return f"{stage}/{key[:SHORT]}"
+
+
+def _relative(store: Store, path: Path) -> str:
+    return path.relative_to(store.root).as_posix()
