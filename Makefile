@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 KOOP := $(BIN)/koop
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-edmd reproduce-eigen reproduce-beyond smoke test check docs pins bench traps wheel clean
+.PHONY: help reproduce reproduce-edmd reproduce-eigen reproduce-beyond smoke test check docs pins bench faults traps wheel clean
 
 help: ## Show this help
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 20
@@ -44,6 +44,10 @@ pins: $(VENV)/.developing ## Pin the stages' toy results, after raising a stage'
 
 bench: $(VENV)/.developing ## Measure speed and memory as ratios within one run (minutes)
 	$(BIN)/python benchmarks/run.py
+	$(BIN)/python benchmarks/store.py
+
+faults: $(VENV)/.developing ## Count what a store loses under thousands of faults, for docs/reliability.md (minutes)
+	$(BIN)/python -m tests.faults
 
 traps: $(VENV)/.developing ## Measure what generic least squares makes of raw monomials (minutes)
 	$(BIN)/python benchmarks/traps.py

@@ -121,15 +121,19 @@ def _judge(call: Invocation, artefact: Artefact, others: dict[str, Task]) -> dic
         call.console.note("no baselines beside it: the data that this predictor was fitted to are no longer there")
         return {}
     quiet = Pipeline(call.pipeline.store, _Unwarned(call.console), call.pipeline.workers)
-    made = {name: quiet.make(task) for name, task in others.items()}
+    names, figures = {}, {}
+    for name, task in others.items():
+        one = quiet.make(task)
+        names[name], figures[name] = one.record.name, one.figures
+        del one  # its scores may be many
     rows = [["this predictor", *_scores(artefact.figures)]]
-    rows += [[NAMES[name], *_scores(one.figures)] for name, one in made.items()]
+    rows += [[NAMES[name], *_scores(found)] for name, found in figures.items()]
     show_table(["RMSE in %", "mean ± std", "median", "max", "re-lifted", "in the data's box"], rows, file=sys.stderr)
     for segment in artefact.figures.get("segments", []):
         call.console.note(f"from sample {segment['start']:>4}: RMSE {segment['rmse']:.4g} %")
-    found = verdict(artefact.figures, {name: one.figures for name, one in made.items()})
+    found = verdict(artefact.figures, figures)
     (call.console.note if found.beats else call.console.warn)(found.text)
-    scores = {name: {"name": one.record.name, "rmse": one.figures["rmse"]} for name, one in made.items()}
+    scores = {name: {"name": names[name], "rmse": figures[name]["rmse"]} for name in others}
     return {"baselines": scores, "beats_baselines": found.beats, "verdict": found.text}
 
 

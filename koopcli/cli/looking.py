@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -66,8 +67,8 @@ def ls(
     rows = [
         {
             "name": record.name,
-            "made": record.provenance["time"],
-            "seconds": record.provenance["seconds"],
+            "made": str(record.provenance.get("time", "")),
+            "seconds": record.provenance.get("seconds", math.nan),
             "bytes": record.size,
             "object": shelf.has_object(record),
             "pins": labels.get(f"{record.stage}/{record.key}", []),
@@ -197,7 +198,9 @@ def _records(shelf: Store, stage: str | None, console: Console) -> list[Record]:
                 found.append(shelf.record(one, key))
             except NewerFormatError as error:
                 console.warn(str(error))
-    return sorted((r for r in found if r is not None), key=lambda r: (r.provenance["time"], r.stage, r.key))
+    return sorted(
+        (r for r in found if r is not None), key=lambda r: (str(r.provenance.get("time", "")), r.stage, r.key)
+    )
 
 
 def _obtain(name: str, store: Path | None) -> tuple[Artefact, Task, Path]:

@@ -190,9 +190,10 @@ class Pipeline:
             with self.reporter.progress(stage.name) as progress:
                 whole = Chunk(self.store.root, task.stage, task.settings, key, tuple(lineage.items()), at_hand=contents)
                 chunks = ChunkedWork(self.store, whole, self.workers, progress, self.reporter.note)
-                content = stage.run(task.settings, contents, Context(progress, self.reporter.warn, chunks))
+                packed = stage.run(task.settings, contents, Context(progress, self.reporter.warn, chunks)).pack()
             seconds = time.perf_counter() - start
-            made = self.store.commit(recipe, lineage, content.pack(), provenance(seconds))
+            made = self.store.commit(recipe, lineage, packed, provenance(seconds))
+            del packed  # before as much is read
             if there is not None and there.data != made.data:
                 self.reporter.warn(
                     f"{made.name} came out different in its last bits; what follows from it is made anew"

@@ -14,6 +14,7 @@ import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import NamedTuple
 
 from koopcli.errors import DamagedArtefactError, StorageError
 
@@ -61,11 +62,19 @@ def _reason(error: OSError) -> str:
     return f"{text}: {error.filename}" if error.filename else text
 
 
-def publish(target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path], None], temporary: Path) -> Path:
+class Published(NamedTuple):
+    """A file as it was when it got its name: another process may move it away at once."""
+
+    path: Path
+    size: int
+    mtime: float
+
+
+def publish(target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path], None], temporary: Path) -> Published:
     """Put a file at ``target``: whole or not at all, and on the disk when this returns.
 
     ``fill`` is the content, or writes it to the path it is given; ``target`` is the path, or finds it from the
-    finished file; ``temporary`` is a folder on the same file system. Returns the path.
+    finished file; ``temporary`` is a folder on the same file system.
     """
     make_folder(temporary)
     beside = temporary / f"{os.getpid()}-{secrets.token_hex(8)}@{socket.gethostname()}"
@@ -77,13 +86,14 @@ def publish(target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path]
             _fsync(beside)
         final = target if isinstance(target, Path) else target(beside)
         make_folder(final.parent)
+        about = beside.stat()
         os.replace(beside, final)
     except BaseException:
         with suppress(OSError):
             beside.unlink(missing_ok=True)
         raise
     _fsync(final.parent)
-    return final
+    return Published(final, about.st_size, about.st_mtime)
 
 
 def sha256_file(path: Path) -> str:

@@ -24,7 +24,8 @@ from koopcli.store.identity import canonical, plain, slabs
 from koopcli.store.texts import Texts
 from koopcli.store.walk import LARGEST, refusals, refuse, walk
 
-MEMORY_LIMIT = 256 << 20
+IMAGE_LIMIT = 32 << 20  # bytes that are laid out in memory, which takes several times as many
+MEMORY_LIMIT = 256 << 20  # bytes that are read as a whole
 IN_MEMORY = 4 * MEMORY_LIMIT  # bytes that an image in memory may unpack to
 
 
@@ -71,26 +72,34 @@ def from_bytes(image: bytes) -> Packed:
         texts = Texts(image)
         with h5py.File.in_memory(image) as file:
             lazy = _packed(file, texts, IN_MEMORY)
-            arrays = {path: Array(array.values[...], array.axes, array.units) for path, array in lazy.arrays.items()}
-            return Packed(arrays, lazy.meta)
+            return loaded(lazy)
+
+
+def loaded(packed: Packed) -> Packed:
+    """The same record, its arrays in memory."""
+    return Packed({path: Array(a.values[...], a.axes, a.units) for path, a in packed.arrays.items()}, packed.meta)
 
 
 def from_file(path: Path) -> Packed:
-    """The record of a file, its arrays left on disk. Raises ``UntrustedFileError``."""
+    """The record of a file; arrays that are large stay on disk. Raises ``UntrustedFileError``."""
     with open_regular(path) as (opened, _):
         return from_open(opened)
 
 
 def from_open(opened: io.FileIO) -> Packed:
-    """The record of that very file, whatever its path leads to by now; its arrays stay on disk."""
+    """The record of that very file, whatever its path leads to by now; arrays that are large stay on disk."""
     with refusals(), mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as content:
         texts = Texts(content)
         file = h5py.File(f"/dev/fd/{opened.fileno()}", "r", locking=False)
         try:
-            return _packed(file, texts)
+            if len(content) > MEMORY_LIMIT:
+                return _packed(file, texts)
+            found = loaded(_packed(file, texts, IN_MEMORY))
         except BaseException:
             file.close()
             raise
+        file.close()
+        return found
 
 
 def read_foreign(path: Path) -> Packed:

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from koopcli.records import Packed
 from koopcli.store import image
-from koopcli.store.files import sha256_file, storage_errors
+from koopcli.store.files import Published, UntrustedFileError, open_regular, storage_errors
 
 SMALL = 4 << 20  # bytes; larger chunks are not held in memory
-Put = Callable[[Packed, Callable[[str], Path]], Path]
+Put = Callable[[Packed, Callable[[str], Path]], Published]
 """Write a record durably to the path found from the digest of its bytes."""
 
 
@@ -48,7 +48,12 @@ class Parts:
 def _verified(path: Path) -> Packed | None:
     """The chunk at ``path``, if it is what its name says."""
     digest = path.stem.partition("-")[2]
-    if path.stat().st_size > SMALL:
-        return image.from_path(path) if sha256_file(path) == digest else None
-    content = path.read_bytes()
-    return image.from_bytes(content) if hashlib.sha256(content).hexdigest() == digest else None
+    try:
+        with open_regular(path) as (file, size):
+            if size > SMALL:
+                right = hashlib.file_digest(file, "sha256").hexdigest() == digest
+                return image.from_path(path) if right else None
+            content = file.read()
+        return image.from_bytes(content) if hashlib.sha256(content).hexdigest() == digest else None
+    except UntrustedFileError:
+        return None

@@ -22,6 +22,7 @@ from koopcli.errors import (
 from koopcli.records import Packed
 from koopcli.store import image
 from koopcli.store.files import (
+    Published,
     UntrustedFileError,
     open_regular,
     publish,
@@ -139,8 +140,8 @@ class Store:
         Where locks do not hold, another process may have committed the same recipe meanwhile: the first record wins.
         """
         digest = data_digest(packed)
-        path = self._put(packed, self._object_path)
-        record = Record(recipe, lineage, path.stem, path.stat().st_size, digest, provenance)
+        path, size, _ = self._put(packed, self._object_path)
+        record = Record(recipe, lineage, path.stem, size, digest, provenance)
         first = self.record(record.stage, record.key)
         if first is not None and self.has_object(first):
             return first
@@ -163,22 +164,22 @@ class Store:
         """The committed chunks of an unfinished artefact."""
         return Parts(self.root / "partial" / key, self._put)
 
-    def _put(self, packed: Packed, target: Callable[[str], Path]) -> Path:
+    def _put(self, packed: Packed, target: Callable[[str], Path]) -> Published:
         """Write the image of ``packed`` to ``target(sha256)``, through memory unless it is large."""
         needed = image.data_bytes(packed)
         with storage_errors(self.root, needed):
-            if needed <= image.MEMORY_LIMIT:
+            if needed <= image.IMAGE_LIMIT:
                 content = image.to_bytes(packed)
                 return self._publish(target(hashlib.sha256(content).hexdigest()), content)
             return self._publish(lambda path: target(sha256_file(path)), lambda path: image.to_file(packed, path))
 
-    def _publish(self, target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path], None]) -> Path:
+    def _publish(self, target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path], None]) -> Published:
         """Publish a file; the first time, clear old litter by the file system's own clock."""
         temporary = self.root / "tmp"
         final = publish(target, fill, temporary)
         if not self._swept:
             self._swept = True
-            sweep(temporary, final.stat().st_mtime)
+            sweep(temporary, final.mtime)
             self._sweep_chunks()
         return final
 
@@ -224,7 +225,7 @@ class Store:
 def _verified(path: Path, record: Record) -> Packed:
     """The content of the one file that is opened, sized, hashed and walked. Raises ``UntrustedFileError``."""
     with open_regular(path) as (file, size):
-        if size == record.size and size <= image.MEMORY_LIMIT:
+        if size == record.size and size <= image.IMAGE_LIMIT:
             content = file.read()
             if hashlib.sha256(content).hexdigest() == record.object:
                 return image.from_bytes(content)

@@ -27,7 +27,6 @@ CHUNK = 64 << 20  # bytes of a chunk, unpacked
 CHUNKS = 1_000_000  # of a dataset
 LARGEST = 1 << 40  # bytes of all arrays: far beyond any artefact, far below where sums of sizes overflow
 RATIO, ALLOWANCE = 100, 1 << 20  # unpacked to stored bytes, above the allowance
-FILTERS = (h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE)  # those whose output can be bounded before HDF5 runs them
 KINDS = [
     "?",
     *(f"{order}{kind}" for order in "<>" for kind in ("i1", "i2", "i4", "i8", "f4", "f8", "u1", "u2", "u4", "u8")),
@@ -112,27 +111,29 @@ class _Walk:
         if self._unpacked > ALLOWANCE + RATIO * self._stored:
             refuse(f"'{path}' unpacks to over {RATIO} times what is stored: {unpacked} bytes from {stored}")
         if layout == h5d.CHUNKED:
-            _check_chunks(dataset, plist, shape, self._size, path)
+            _check_chunks(dataset, plist, shape, path)
         elif stored != unpacked or (dataset.get_offset() or 0) + stored > self._size:
             refuse(f"the values of '{path}' were never stored")
 
 
 def _names(group: h5g.GroupID, path: str) -> list[bytes]:
     """The names in a group, each one that a path can hold and a hard link."""
-    found: list[bytes] = []
+    links: list[tuple[bytes, int]] = []
 
-    def check(name: bytes, link: Any) -> None:
+    def collect(name: bytes, link: Any) -> bool:  # h5py lets nothing be raised here
+        links.append((name, link.type))
+        return len(links) > OBJECTS
+
+    group.links.iterate(collect, info=True)
+    if len(links) > OBJECTS:
+        refuse(f"it holds over {OBJECTS} objects")
+    for name, kind in links:
         text = name.decode()
         if text in ("", ".", "..") or "/" in text or not text.isprintable() or len(name) > NAME:
             refuse(f"the name '{text[:NAME]}' in '/{path}' is not one that koop gives")
-        if link.type != h5l.TYPE_HARD:
+        if kind != h5l.TYPE_HARD:
             refuse(f"'{path}/{text}' is a link to elsewhere".replace("'/", "'"))
-        if len(found) >= OBJECTS:
-            refuse(f"it holds over {OBJECTS} objects")
-        found.append(name)
-
-    group.links.iterate(check, info=True)
-    return found
+    return [name for name, _ in links]
 
 
 def _check_attributes(item: Any, path: str) -> None:
@@ -146,26 +147,30 @@ def _check_attributes(item: Any, path: str) -> None:
             refuse(f"an attribute of '/{path}' is neither a text nor a number")
 
 
-def _check_chunks(dataset: h5d.DatasetID, plist: Any, shape: tuple[int, ...], size: int, path: str) -> None:
-    """Every chunk lies in the file and unpacks to the size of a chunk: HDF5 itself inflates to whatever comes."""
+def _check_chunks(dataset: h5d.DatasetID, plist: Any, shape: tuple[int, ...], path: str) -> None:
+    """Every chunk unpacks to the size of a chunk: HDF5 itself inflates to whatever comes, other filters grow unseen."""
     chunk: tuple[int, ...] = plist.get_chunk()
-    length = math.prod(chunk) * dataset.get_type().get_size()
-    filters = [plist.get_filter(i)[0] for i in range(plist.get_nfilters())]
-    if length > CHUNK or not set(filters) <= set(FILTERS) or len(set(filters)) < len(filters):
+    width = dataset.get_type().get_size()
+    length = math.prod(chunk) * width
+    steps = [plist.get_filter(i) for i in range(plist.get_nfilters())]
+    filters = [code for code, *_ in steps]
+    usual = [*((h5z.FILTER_DEFLATE, (level,)) for level in range(10)), (h5z.FILTER_SHUFFLE, (width,))]
+    if length > CHUNK or len(set(filters)) < len(filters) or any((code, how) not in usual for code, _, how, _ in steps):
         refuse(f"'{path}' is packed by other than gzip and shuffle, or in chunks over {CHUNK} bytes")
     grid = math.prod(-(-n // step) for n, step in zip(shape, chunk, strict=True))
-    found: dict[tuple[int, ...], Any] = {}
+    found: list[Any] = []
 
-    def collect(one: Any) -> None:
-        if one.chunk_offset in found or len(found) >= min(grid, CHUNKS):
-            refuse(f"'{path}' has more chunks than it can hold")
-        if one.byte_offset + one.size > size or one.size > 2 * length + 1024:
-            refuse(f"a chunk of '{path}' claims bytes that it cannot have")
-        found[one.chunk_offset] = one
+    def collect(one: Any) -> bool | None:
+        found.append(one)
+        return len(found) > min(grid, CHUNKS) or None
 
     dataset.chunk_iter(collect)
-    for place in found:
-        skipped, stored = dataset.read_direct_chunk(place)
+    if len(found) > min(grid, CHUNKS) or len({one.chunk_offset for one in found}) < len(found):
+        refuse(f"'{path}' has more chunks than it can hold")
+    for one in found:
+        if one.size > 2 * length + 1024:
+            refuse(f"a chunk of '{path}' claims bytes that it cannot have")
+        skipped, stored = dataset.read_direct_chunk(one.chunk_offset)
         deflated = any(code == h5z.FILTER_DEFLATE and not skipped >> i & 1 for i, code in enumerate(filters))
         if (_inflated(stored, length) if deflated else len(stored)) != length:
             refuse(f"a chunk of '{path}' does not unpack to its size")

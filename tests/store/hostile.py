@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import ctypes
+import io
 import os
 import struct
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5p, h5r, h5s, h5t, h5z
+from h5py import h5a, h5d, h5p, h5s, h5t, h5z
+
+from tests.store.checksums import sums, with_sums
 
 Make = Callable[[h5py.File, Path], None]
 CASES: dict[str, tuple[Make, str]] = {}
@@ -63,21 +66,17 @@ def make(name: str, path: Path, secret: Path) -> Path:
 
 
 @contextmanager
-def watched(path: Path) -> Iterator[Callable[[], bool]]:
-    """Tells whether anything opened ``path`` since, C or Python, by the kernel's word."""
+def watched(path: Path) -> Iterator[list[bytes]]:
+    """After the block, a list that is empty if nothing, in C or in Python, opened ``path`` meanwhile."""
     libc = ctypes.CDLL(None, use_errno=True)
     descriptor = libc.inotify_init1(os.O_NONBLOCK)
     if descriptor < 0 or libc.inotify_add_watch(descriptor, bytes(path), 0x21) < 0:  # opened or read
         raise OSError(ctypes.get_errno(), "inotify")
-
-    def opened() -> bool:
-        try:
-            return bool(os.read(descriptor, 4096))
-        except BlockingIOError:
-            return False
-
+    seen: list[bytes] = []
     try:
-        yield opened
+        yield seen
+        with suppress(BlockingIOError):
+            seen.append(os.read(descriptor, 4096))
     finally:
         os.close(descriptor)
 
@@ -273,6 +272,12 @@ def stream_without_end(file, secret):
     _chunked(file, (64,), (64,), h5z.FILTER_DEFLATE).id.write_direct_chunk((0,), zlib.compress(bytes(512))[:-4])
 
 
+@case("claims bytes")
+def junk_behind_a_chunk(file, secret):
+    packed = zlib.compress(bytes(512)) + bytes(100_000)
+    _chunked(file, (64,), (64,), h5z.FILTER_DEFLATE).id.write_direct_chunk((0,), packed)
+
+
 @case("does not unpack to its size")
 def short_chunk(file, secret):
     _chunked(file, (1024,), (1024,), h5z.FILTER_DEFLATE).id.write_direct_chunk((0,), bytes(8), filter_mask=1)
@@ -300,7 +305,7 @@ def never_written(file, secret):
 
 @case("chunks over")
 def huge_chunk(file, secret):
-    _chunked(file, (4,), (1 << 28,))
+    _chunked(file, (9 << 20,), (9 << 20,), h5z.FILTER_DEFLATE).id.write_direct_chunk((0,), bytes(1 << 20))
 
 
 @case("packed by other")
@@ -366,13 +371,13 @@ def reference_beside_an_array(file, secret):
 
 @case("neither a text nor a number")
 def list_beside_an_array(file, secret):
-    file["x"].attrs.create("evil", np.array([np.arange(3)], object), dtype=h5py.vlen_dtype(int))
+    h5a.create(file["x"].id, b"evil", h5t.vlen_create(h5t.STD_I64LE), h5s.create(h5s.SCALAR))
 
 
 @case("neither a text nor a number")
 def committed_type_beside_an_array(file, secret):
     kind = h5t.IEEE_F64LE.copy()
-    kind.commit(file.create_group("hidden").id, b"kind")
+    kind.commit(file.create_group("z").id, b"kind")
     h5a.create(file["x"].id, b"evil", kind, h5s.create(h5s.SCALAR))
 
 
@@ -458,11 +463,42 @@ def heap_that_goes_nowhere(content):
 @raw("not where it should be")
 def text_of_gigabytes(content):
     """HDF5 clears the memory for it before it finds that the text has three letters."""
-    head = content.index(b"row")
-    number = struct.pack("<Q", content.index(b"GCOL"))
     changed = bytearray(content)
-    start = 0
-    while (start := content.find(number, start + 1)) > 0:
-        if start < head and changed[start - 4 : start] == b"\3\0\0\0":
-            changed[start - 1] = 0x3F
-    return bytes(changed)
+    length = content.index(struct.pack("<IQ", 3, content.index(b"GCOL")))
+    changed[length + 3] = 0x3F
+    return with_sums(changed, sums(content))
+
+
+def _patched(content: bytes, place: int, size: int) -> bytes:
+    """The layout of the array moved to ``place``, its size and its shape made ``size``."""
+    start = content.rindex(b"OHDR")
+    old = struct.pack("<Q", LENGTH)
+    with h5py.File(io.BytesIO(content)) as file:
+        layout = struct.pack("<Q", file["x"].id.get_offset()) + old
+    end = content.index(layout, start) + 16
+    head = content[start : end - 16].replace(old, struct.pack("<Q", size)) + struct.pack("<QQ", place, size)
+    return with_sums(bytearray(content[:start] + head + content[end:]), sums(content))
+
+
+@raw("invalid dataset size|never stored")
+def values_past_the_end(content):
+    return _patched(content, len(content) - LENGTH // 2, LENGTH)
+
+
+@raw("invalid dataset size|room for")
+def more_values_than_the_file_has(content):
+    return _patched(content, 48, len(content) + 1)
+
+
+@raw("room for")
+def one_array_many_times(content):
+    """Ten arrays of the same bytes: what takes little to store is read again and again."""
+    memory = io.BytesIO(content)
+    size = 1 << 16
+    with h5py.File(memory, "r+", libver=("v110", "v110")) as file:
+        describe(file.create_dataset("all", data=np.ones(size, np.uint8)))
+        place = struct.pack("<Q", file["all"].id.get_offset())
+        for i in range(9):
+            describe(file.create_dataset(f"again{i}", (size,), np.uint8))
+    content, length = memory.getvalue(), struct.pack("<Q", size)
+    return with_sums(bytearray(content.replace(b"\xff" * 8 + length, place + length)), sums(content))

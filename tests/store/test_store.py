@@ -76,7 +76,7 @@ def test_a_flipped_bit_is_found_and_the_object_put_aside(store, where):
 @pytest.mark.parametrize("large", [False, True])
 def test_large_content_goes_through_a_file(store, monkeypatch, large):
     if large:
-        monkeypatch.setattr(image, "MEMORY_LIMIT", 100)
+        monkeypatch.setattr(image, "IMAGE_LIMIT", 100)
     record = store.commit(recipe(), {}, packed(n=10_000), {})
     assert store.path(record).stem == record.object
     assert (store.read(record).arrays["x"].values[...] == 1).all()
