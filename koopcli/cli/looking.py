@@ -67,8 +67,8 @@ def ls(
     rows = [
         {
             "name": record.name,
-            "made": str(record.provenance.get("time", "")),
-            "seconds": record.provenance.get("seconds", math.nan),
+            "made": _time(record),
+            "seconds": _seconds(record),
             "bytes": record.size,
             "object": shelf.has_object(record),
             "pins": labels.get(f"{record.stage}/{record.key}", []),
@@ -198,9 +198,18 @@ def _records(shelf: Store, stage: str | None, console: Console) -> list[Record]:
                 found.append(shelf.record(one, key))
             except NewerFormatError as error:
                 console.warn(str(error))
-    return sorted(
-        (r for r in found if r is not None), key=lambda r: (str(r.provenance.get("time", "")), r.stage, r.key)
-    )
+    return sorted((r for r in found if r is not None), key=lambda r: (_time(r), r.stage, r.key))
+
+
+def _time(record: Record) -> str:
+    """When an artefact was made, as far as its record says so."""
+    return str(record.provenance.get("time", ""))
+
+
+def _seconds(record: Record) -> float:
+    """How long it took, as far as its record says so."""
+    value = record.provenance.get("seconds")
+    return float(value) if isinstance(value, (int, float)) else math.nan
 
 
 def _obtain(name: str, store: Path | None) -> tuple[Artefact, Task, Path]:
