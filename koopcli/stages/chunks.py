@@ -97,7 +97,7 @@ class ChunkedWork:
         return replace(self.whole, i=i, start=rows.start, stop=rows.stop, progress=inside)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)
 def _content(root: Path, name: str) -> Any:
     """The verified content of an input, kept from one chunk to the next."""
     store = Store(root)

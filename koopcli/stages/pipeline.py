@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from koopcli.errors import DamagedArtefactError, UnknownNameError
+from koopcli.errors import DamagedArtefactError, StorageError, UnknownNameError
 from koopcli.stages.base import Context, Cost, Reporter, Stage, Task
 from koopcli.stages.chunks import Chunk, ChunkedWork
 from koopcli.stages.recorded import content_of, recipe_of, settings_of
@@ -185,15 +185,16 @@ class Pipeline:
             if there is not None and found is not None:
                 return there, found, True
             start = time.perf_counter()
-            contents = {role: content for role, (_, content) in inputs.items()}
-            lineage = {role: f"{record.stage}/{record.key}" for role, (record, _) in inputs.items()}
-            with self.reporter.progress(stage.name) as progress:
-                whole = Chunk(self.store.root, task.stage, task.settings, key, tuple(lineage.items()), at_hand=contents)
-                chunks = ChunkedWork(self.store, whole, self.workers, progress, self.reporter.note)
-                packed = stage.run(task.settings, contents, Context(progress, self.reporter.warn, chunks)).pack()
+            try:
+                made = self._run(task, recipe, inputs)
+            except (FileNotFoundError, StorageError):
+                # Where no lock keeps others away, one may have finished it and cleared the chunks that were being read.
+                there = self.store.record(task.stage, key)
+                found = self._read(task, there)
+                if there is None or found is None:
+                    raise
+                return there, found, True
             seconds = time.perf_counter() - start
-            made = self.store.commit(recipe, lineage, packed, provenance(seconds))
-            del packed  # before as much is read
             if there is not None and there.data != made.data:
                 self.reporter.warn(
                     f"{made.name} came out different in its last bits; what follows from it is made anew"
@@ -204,6 +205,18 @@ class Pipeline:
         self._records[task] = made
         self.announce(made.name, f"made in {seconds:.1f} s: {stage.describe(stage.figures(content))}")
         return made, content, False
+
+    def _run(self, task: Task, recipe: Mapping[str, Any], inputs: Mapping[str, tuple[Record, Any]]) -> Record:
+        """Compute and commit ``task``; what was computed is let go of, before as much is read again."""
+        start = time.perf_counter()
+        stage, key = STAGES[task.stage], key_of(recipe)
+        contents = {role: content for role, (_, content) in inputs.items()}
+        lineage = {role: f"{record.stage}/{record.key}" for role, (record, _) in inputs.items()}
+        with self.reporter.progress(stage.name) as progress:
+            whole = Chunk(self.store.root, task.stage, task.settings, key, tuple(lineage.items()), at_hand=contents)
+            chunks = ChunkedWork(self.store, whole, self.workers, progress, self.reporter.note)
+            packed = stage.run(task.settings, contents, Context(progress, self.reporter.warn, chunks)).pack()
+        return self.store.commit(recipe, lineage, packed, provenance(time.perf_counter() - start))
 
     def _refuse_without_room(self, task: Task) -> None:
         """Refuse what will not fit into the store, chunks and their whole at once, before anything is computed."""

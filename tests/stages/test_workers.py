@@ -145,3 +145,27 @@ def test_simulations_are_resumed_chunk_by_chunk(tmp_path, alone, monkeypatch):
     made = Pipeline(store, heard).make(task)
     assert "3 of 20 chunks were already there" in heard.notes
     assert alone[made.record.name] == made.record.object
+
+
+def test_without_locks_chunks_may_be_cleared_while_they_are_joined(tmp_path, alone, monkeypatch):
+    """Another process finishes the artefact just before this one reads its chunks once more: its record wins."""
+    from contextlib import nullcontext
+
+    from koopcli.store import parts
+
+    monkeypatch.setattr(parts, "SMALL", 0)  # chunks stay on disk
+    monkeypatch.setattr(Store, "lock", lambda self, key, name: nullcontext())
+    task = recipes.simulation(load_experiment("paper", parse_set(CHUNKED)))
+    real, calls = Store.commit, []
+
+    def overtaken(self, recipe, *rest):
+        calls.append(recipe["stage"])
+        if calls.count("simulate") == 1 and recipe["stage"] == "simulate":
+            Pipeline(Store(tmp_path), Listener()).make(task)
+        return real(self, recipe, *rest)
+
+    monkeypatch.setattr(Store, "commit", overtaken)
+    made = Pipeline(Store(tmp_path), Listener()).make(task)
+    assert calls.count("simulate") == 2
+    assert made.cached
+    assert made.record.object == alone[made.record.name]
