@@ -21,10 +21,10 @@ from pathlib import Path
 import numpy as np
 
 from koopcli.errors import DamagedArtefactError, StorageError
-from koopcli.store import Record, Store
+from koopcli.store import Record, Store, image
 from tests.writer import KEYS, commit, content
 
-CALLS = ("open", "pwrite", "fsync", "replace", "mkdir")
+CALLS = ("open", "pwrite", "fsync", "replace", "mkdir", "posix_fallocate")
 
 
 @dataclass
@@ -107,29 +107,32 @@ def failing(call: str, n: int, code: int) -> Iterator[Callable[[], int]]:
         setattr(os, call, real)
 
 
-def errors(folder: Path, code: int, rounds: int = 1) -> Count:
-    """An error at the n-th call of each kind, for every n of a commit: the old state is left, or the new."""
-    count = Count()
-    for i in range(rounds):
+def errors(folder: Path, code: int) -> Count:
+    """An error at the n-th call of each kind, for every n of a commit: the old state is left, or the new.
+
+    Once for what is laid out in memory, and once for what is large.
+    """
+    count, usual = Count(), image.IMAGE_LIMIT
+    for limit in (usual, 0):
         for call in CALLS:
-            n = 0
-            while True:
+            reached, n = True, 0
+            while reached:
                 n += 1
-                root = folder / f"{i}-{call}-{n}"
-                old = commit(Store(root), 0).key
-                count.injected += 1
-                with failing(call, n, code) as calls:
-                    try:
-                        done = {commit(Store(root), 1).key}
-                    except StorageError:
-                        done = set()
-                        count.struck += 1
-                    reached = calls() >= n
+                root = folder / f"{limit}-{call}-{n}"
+                old, done = commit(Store(root), 0).key, set()
+                image.IMAGE_LIMIT = limit
+                try:
+                    with failing(call, n, code) as calls:
+                        try:
+                            done = {commit(Store(root), 1).key}
+                        except StorageError:
+                            count.struck += 1
+                        reached = calls() >= n
+                finally:
+                    image.IMAGE_LIMIT = usual
+                count.injected += reached
                 settle(Store(root), {old} | done, count)
                 count.accepted += len(list((root / "tmp").iterdir()))
-                if not reached:
-                    count.injected -= 1
-                    break
     return count
 
 
@@ -177,7 +180,7 @@ def main() -> None:
             (errno.EROFS, "read-only file system"),
             (errno.EACCES, "permission denied"),
         ):
-            row(f"{what} at the n-th open, write, fsync, rename or mkdir", errors(work / str(code), code))
+            row(f"{what} at the n-th open, write, fsync, rename, …", errors(work / str(code), code))
         for what, count in zip(("a bit flipped", "an end cut off"), damage(work, 3000, 2000), strict=True):
             row(f"{what} in an object", count)
 
