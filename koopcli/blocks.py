@@ -75,4 +75,6 @@ class Chosen:
 def _split(index: Any) -> tuple[Any, tuple[Any, ...]]:
     """What an index says of the first axis, and of the others."""
     first, *rest = index if isinstance(index, tuple) else (index,)
+    if first is Ellipsis and rest:
+        raise IndexError("blocks are indexed from their first axis")
     return (slice(None) if first is Ellipsis else first), tuple(rest)

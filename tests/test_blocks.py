@@ -41,6 +41,12 @@ def test_chosen_is_fancy_indexing(tmp_path, rows, on_disk):
         assert (chosen[rows, :2] == VALUES[kept][rows, :2]).all()
 
 
+def test_blocks_know_no_last_axis():
+    for whole in (joined([3]), Chosen(VALUES, np.array([1]))):
+        with pytest.raises(IndexError):
+            whole[..., 1]
+
+
 def test_blocks_cover_a_slice_once():
     assert list(blocks(slice(3, 10), 3)) == [slice(3, 6), slice(6, 9), slice(9, 10)]
     assert list(blocks(slice(3, 3), 3)) == []

@@ -28,7 +28,9 @@ def verify(
     store: StoreOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Check the store for damage. Without --repair nothing is changed.
+    """Check the artefacts of the store for damage. Without --repair nothing is changed.
+
+    Chunks of what is unfinished are checked when they are used.
 
     Example: koop verify --repair
     """
@@ -81,7 +83,8 @@ def gc(
 ) -> None:
     """Remove artefacts that nobody keeps: neither pinned, nor young, nor behind any such artefact.
 
-    Also what interrupted commands have left. Damaged files that were put aside stay where they are.
+    Also what interrupted commands have left. Damaged files that were put aside stay where they are. With --grace 0
+    nobody else should be at work: what others have just made is not pinned yet.
 
     Example: koop gc --grace 30 --delete
     """

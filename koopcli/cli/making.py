@@ -210,7 +210,7 @@ def simulate(
     """Simulate trajectories of a vehicle from a sample.
 
     Stiff plants choose the steps within a sample themselves. A trajectory that leaves the numbers that mean anything
-    ends there, with its reason.
+    ends there, with its reason. An interrupted simulation goes on where it stopped.
 
     Example: koop simulate --plant wheels --vehicle my-car.toml
     """

@@ -15,7 +15,7 @@ from koopcli.errors import KoopError, StorageError
 from koopcli.progress import Progress, silent
 from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline
-from koopcli.stages.workers import done, result
+from koopcli.stages.workers import WorkerDiedError, done, result
 from koopcli.store import Store
 
 
@@ -75,7 +75,7 @@ def _each(pipeline: Pipeline, missing: list[Task]) -> Iterator[Made]:
             task = running.pop(future)
             try:
                 made = result(future)
-            except StorageError:  # nothing else could be stored either
+            except (StorageError, WorkerDiedError):  # the next one would fare no better
                 raise
             except KoopError:
                 continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -49,9 +50,12 @@ class Chunk:
 
 
 def commit(chunk: Chunk) -> list[str]:
-    """Compute a chunk and store it; returns what the store warned of."""
+    """Compute a chunk and store it; returns what the store warned of. Without its inputs nothing is done."""
     warned: list[str] = []
-    Store(chunk.root, warned.append).parts(chunk.key).commit(chunk.i, chunk.compute())
+    store = _store(chunk.root)
+    store.warn = warned.append
+    with suppress(_GoneError):
+        store.parts(chunk.key).commit(chunk.i, chunk.compute())
     return warned
 
 
@@ -65,6 +69,8 @@ class ChunkedWork:
     workers: Workers
     progress: Progress
     note: Callable[[str], None]
+    size: float = 0.0
+    """About how many bytes the whole will have."""
 
     def __call__(self, count: int, size: int) -> list[Packed]:
         """The packed results of all slices of ``range(count)``, in order; large ones stay on disk."""
@@ -72,8 +78,9 @@ class ChunkedWork:
         if len(chunks) == 1:
             return [chunks[0].compute()]
         parts = self.store.parts(self.whole.key)
-        found = [parts.read(chunk.i) for chunk in chunks]
-        missing = [chunk for chunk, there in zip(chunks, found, strict=True) if there is None]
+        self.store.require(2 * self.size - parts.size())  # the chunks, then the whole beside them
+        found = parts.read(range(len(chunks)))
+        missing = [chunk for chunk in chunks if chunk.i not in found]
         if len(missing) < len(chunks):
             self.note(f"{len(chunks) - len(missing)} of {len(chunks)} chunks were already there")
         alone = self.workers.count == 1
@@ -85,9 +92,9 @@ class ChunkedWork:
             ready += chunk.stop - chunk.start
             if not alone:
                 self.progress(ready, count)
-        for chunk in missing:  # where no lock keeps others away, one may have cleared them: then they are made here
-            found[chunk.i] = parts.read(chunk.i) or chunk.compute()
-        return [one for one in found if one is not None]
+        found |= parts.read([chunk.i for chunk in missing])
+        # Others may have cleared chunks where no lock keeps them away, or have removed the inputs of a worker.
+        return [found[chunk.i] if chunk.i in found else chunk.compute() for chunk in chunks]
 
     def _chunk(self, i: int, rows: slice, count: int) -> Chunk:
         def inside(done: int, total: int) -> None:
@@ -97,11 +104,24 @@ class ChunkedWork:
         return replace(self.whole, i=i, start=rows.start, stop=rows.stop, progress=inside)
 
 
+class _GoneError(Exception):
+    """An input is no longer in the store, or no longer good."""
+
+
+@lru_cache(maxsize=1)
+def _store(root: Path) -> Store:
+    """One store a process, which sweeps litter once."""
+    return Store(root)
+
+
 @lru_cache(maxsize=2)
 def _content(root: Path, name: str) -> Any:
     """The verified content of an input, kept from one chunk to the next."""
-    store = Store(root)
+    store = _store(root)
     record = store.record(*name.split("/"))
     if record is None:
-        raise DamagedArtefactError(f"{name} is no longer in the store: run the same command again")
-    return content_of(record, store)
+        raise _GoneError
+    try:
+        return content_of(record, store)
+    except DamagedArtefactError as error:
+        raise _GoneError from error

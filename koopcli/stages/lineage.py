@@ -30,17 +30,20 @@ class Ancestor:
             yield from one.behind(f"{roles} / {one.role}".removeprefix(" / "))
 
 
-def lineage(record: Record, store: Store, role: str = "") -> Ancestor:
-    """``record`` with everything that it was made from, as far as it is in the store."""
-    inputs = tuple(_input(store, role, full) for role, full in record.lineage.items())
+def lineage(record: Record, store: Store, role: str = "", below: tuple[str, ...] = ()) -> Ancestor:
+    """``record`` with everything that it was made from, as far as it is in the store; ``below``: made from it."""
+    full = f"{record.stage}/{record.key}"
+    inputs = tuple(_input(store, role, one, (*below, full)) for role, one in record.lineage.items())
     state = "present" if store.has_object(record) else "missing"
-    return Ancestor(role, f"{record.stage}/{record.key}", record, state, inputs)
+    return Ancestor(role, full, record, state, inputs)
 
 
-def _input(store: Store, role: str, full: str) -> Ancestor:
+def _input(store: Store, role: str, full: str, below: tuple[str, ...]) -> Ancestor:
+    if full in below:  # no command writes such a record
+        return Ancestor(role, full, None, "made from itself")
     stage, _, key = full.partition("/")
     try:
         record = store.record(stage, key)
     except NewerFormatError:
         return Ancestor(role, full, None, "of a newer format")
-    return Ancestor(role, full, None, "gone") if record is None else lineage(record, store, role)
+    return Ancestor(role, full, None, "gone") if record is None else lineage(record, store, role, below)

@@ -78,11 +78,7 @@ class Pipeline:
                 return
             for _, upstream in step.inputs:
                 visit(upstream)
-            try:
-                cost = STAGES[step.stage].estimate(step)
-            except UnknownNameError:  # something behind a named artefact is gone, which only an estimate needs
-                cost = Cost(0, 0)
-            steps[step] = Step(step, "make", step.name, cost)
+            steps[step] = Step(step, "make", step.name, _cost(step))
 
         self.check(task)
         visit(task)
@@ -115,14 +111,16 @@ class Pipeline:
             if step.key is None:
                 STAGES[step.stage].check(step)
 
-    def _task(self, record: Record) -> Task:
+    def _task(self, record: Record, below: tuple[str, ...] = ()) -> Task:
+        if record.key in below:
+            raise DamagedArtefactError(f"{record.name} is named among what it was made from: run its command afresh")
         settings = settings_of(record)
         inputs = []
         for role, name in record.lineage.items():
             stage, _, key = name.partition("/")
             upstream = self.store.record(stage, key)
             if upstream is not None:
-                inputs.append((role, self._task(upstream)))
+                inputs.append((role, self._task(upstream, (*below, record.key))))
         task = Task(record.stage, settings, tuple(inputs), record.key)
         self._records[task] = record
         return task
@@ -170,7 +168,7 @@ class Pipeline:
     def _build(self, task: Task) -> tuple[Record, Any, bool]:
         """Make ``task`` under its lock, unless another process has just done so."""
         stage = STAGES[task.stage]
-        self._refuse_without_room(task)
+        self.store.require(_cost(task).bytes)  # before anything is made for it
         inputs = {role: self._obtain(upstream)[:2] for role, upstream in task.inputs}
         recipe = recipe_of(task, {role: record for role, (record, _) in inputs.items()})
         key = key_of(recipe)
@@ -214,18 +212,9 @@ class Pipeline:
         lineage = {role: f"{record.stage}/{record.key}" for role, (record, _) in inputs.items()}
         with self.reporter.progress(stage.name) as progress:
             whole = Chunk(self.store.root, task.stage, task.settings, key, tuple(lineage.items()), at_hand=contents)
-            chunks = ChunkedWork(self.store, whole, self.workers, progress, self.reporter.note)
+            chunks = ChunkedWork(self.store, whole, self.workers, progress, self.reporter.note, _cost(task).bytes)
             packed = stage.run(task.settings, contents, Context(progress, self.reporter.warn, chunks)).pack()
         return self.store.commit(recipe, lineage, packed, provenance(time.perf_counter() - start))
-
-    def _refuse_without_room(self, task: Task) -> None:
-        """Refuse what will not fit into the store, chunks and their whole at once, before anything is computed."""
-        stage = STAGES[task.stage]
-        try:
-            needed = stage.estimate(task).bytes * (2 if stage.chunk else 1)
-        except UnknownNameError:  # something behind a named artefact is gone, which only an estimate needs
-            return
-        self.store.require(needed)
 
     def _rebuildable(self, task: Task, record: Record | None) -> None:
         """Refuse to replace a named artefact by something that today's code would not give the same key."""
@@ -243,3 +232,11 @@ class Pipeline:
         if name not in self.said:
             self.said[name] = what
             self.reporter.note(f"{name:<24} {what}")
+
+
+def _cost(task: Task) -> Cost:
+    """What making ``task`` will cost, as far as what it is made from is known."""
+    try:
+        return STAGES[task.stage].estimate(task)
+    except UnknownNameError:  # something behind a named artefact is gone, which only an estimate needs
+        return Cost(0, 0)

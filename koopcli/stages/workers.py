@@ -97,8 +97,12 @@ def result(future: Future[Result]) -> Result:
         raise _died() from error
 
 
-def _died() -> InvalidValueError:
-    return InvalidValueError(
+class WorkerDiedError(InvalidValueError):
+    """A worker was ended from outside: what it did would end the next one too."""
+
+
+def _died() -> WorkerDiedError:
+    return WorkerDiedError(
         "a worker process died, most likely for want of memory: choose fewer --workers; what is done stays done"
     )
 

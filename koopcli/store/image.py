@@ -90,7 +90,8 @@ def from_open(opened: io.FileIO) -> Packed:
     """The record of that very file, whatever its path leads to by now; arrays that are large stay on disk."""
     with refusals(), mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as content:
         texts = Texts(content)
-        file = h5py.File(f"/dev/fd/{opened.fileno()}", "r", locking=False)
+        # Not by its path: that may be another file by now, one as good, or none.
+        file = h5py.File(_Opened(os.dup(opened.fileno())), "r", locking=False)
         try:
             if len(content) > MEMORY_LIMIT:
                 return _packed(file, texts)
@@ -100,6 +101,13 @@ def from_open(opened: io.FileIO) -> Packed:
             raise
         file.close()
         return found
+
+
+class _Opened(io.FileIO):
+    """A file that is closed with the last array that is read from it."""
+
+    def __del__(self) -> None:
+        self.close()
 
 
 def read_foreign(path: Path) -> Packed:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import math
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -67,8 +68,10 @@ def _wait(lock: FileLock, name: str) -> None:
     text = os.environ.get(LOCK_TIMEOUT, "3600")
     try:
         seconds = float(text)
-    except ValueError as error:
-        raise InvalidValueError(f"{LOCK_TIMEOUT} must be a number of seconds, got {text!r}") from error
+    except ValueError:
+        seconds = math.nan
+    if not 0 <= seconds < math.inf:
+        raise InvalidValueError(f"{LOCK_TIMEOUT} must be a number of seconds, got {text!r}")
     try:
         lock.acquire(timeout=seconds)
     except Timeout as error:

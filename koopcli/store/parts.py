@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
 
@@ -11,7 +12,8 @@ from koopcli.records import Packed
 from koopcli.store import image
 from koopcli.store.files import Published, UntrustedFileError, open_regular, storage_errors
 
-SMALL = 4 << 20  # bytes; larger chunks are not held in memory
+HELD = 64 << 20  # bytes of the chunks of one artefact that are held in memory; others are read where they are needed
+CHUNK = re.compile(r"(\d+)-([0-9a-f]{64})\.h5")
 Put = Callable[[Packed, Callable[[str], Path]], Published]
 """Write a record durably to the path found from the digest of its bytes."""
 
@@ -22,16 +24,26 @@ class Parts:
     def __init__(self, folder: Path, put: Put) -> None:
         self._folder = folder
         self._put = put
+        self._room = HELD
 
-    def read(self, i: int) -> Packed | None:
-        """Chunk ``i``, verified, or None; a large one stays on disk."""
+    def read(self, numbers: Collection[int]) -> dict[int, Packed]:
+        """Those of the chunks ``numbers`` that are there, verified; a damaged one is removed."""
+        found: dict[int, Packed] = {}
         with storage_errors(self._folder):
-            for path in sorted(self._folder.glob(f"{i}-*.h5")):
-                found = _verified(path)
-                if found is not None:
-                    return found
-                path.unlink(missing_ok=True)
-        return None
+            for path in self._files():
+                match = CHUNK.fullmatch(path.name)
+                if match and int(match[1]) in numbers and int(match[1]) not in found:
+                    packed = self._verified(path, match[2])
+                    if packed is None:
+                        path.unlink(missing_ok=True)
+                    else:
+                        found[int(match[1])] = packed
+        return found
+
+    def size(self) -> int:
+        """Bytes of what is there."""
+        with storage_errors(self._folder):
+            return sum(path.stat().st_size for path in self._files())
 
     def commit(self, i: int, packed: Packed) -> None:
         """Store chunk ``i``."""
@@ -44,16 +56,22 @@ class Parts:
                 path.unlink()
             self._folder.rmdir()
 
+    def _files(self) -> list[Path]:
+        try:
+            return sorted(self._folder.iterdir())
+        except FileNotFoundError:
+            return []
 
-def _verified(path: Path) -> Packed | None:
-    """The chunk at ``path``, if it is what its name says."""
-    digest = path.stem.partition("-")[2]
-    try:
-        with open_regular(path) as (file, size):
-            if size > SMALL:
-                right = hashlib.file_digest(file, "sha256").hexdigest() == digest
-                return image.from_path(path) if right else None
-            content = file.read()
-        return image.from_bytes(content) if hashlib.sha256(content).hexdigest() == digest else None
-    except UntrustedFileError:
-        return None
+    def _verified(self, path: Path, digest: str) -> Packed | None:
+        """The chunk at ``path``, if it is what its name says."""
+        try:
+            with open_regular(path) as (file, size):
+                if hashlib.file_digest(file, "sha256").hexdigest() != digest:
+                    return None
+                if size > self._room:
+                    return image.from_path(path)
+                self._room -= size
+                file.seek(0)
+                return image.from_bytes(file.read())
+        except (FileNotFoundError, UntrustedFileError):
+            return None

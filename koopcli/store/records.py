@@ -100,6 +100,9 @@ def _well_formed(record: Record) -> bool:
         and record.size >= 0
         and all(map(is_name, record.lineage.values()))
         and isinstance(record.recipe.get("stage"), str)
+        and type(record.recipe.get("version")) is int
+        and all(isinstance(record.recipe.get(name), dict) for name in ("settings", "inputs"))
+        and all(isinstance(one, str) and DIGEST.fullmatch(one) for one in record.recipe["inputs"].values())
     )
 
 

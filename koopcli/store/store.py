@@ -40,6 +40,7 @@ from koopcli.store.records import SHORT, BadRecordError, Record, is_name
 
 KEY = re.compile(r"([0-9a-f]{64})\.json")
 CANDIDATES = 8
+AGAIN = 3  # times to read a file that others replace meanwhile, before it is taken for damaged
 
 
 def store_root(given: str | Path | None = None) -> Path:
@@ -69,14 +70,18 @@ class Store:
         if not is_name(f"{stage}/{key}"):
             return None
         path = self._record_path(stage, key)
-        try:
-            with reading_errors(path):
-                return Record.from_json(read_small(path), stage, key)
-        except FileNotFoundError:
-            return None
-        except (BadRecordError, UntrustedFileError):
-            self.warn(f"the record of {stage}/{key[:SHORT]} is damaged {self._put_aside(path)}")
-            return None
+        for _ in range(AGAIN):
+            before = _identity(path)
+            try:
+                with reading_errors(path):
+                    return Record.from_json(read_small(path), stage, key)
+            except FileNotFoundError:
+                return None
+            except (BadRecordError, UntrustedFileError):
+                if _identity(path) == before:
+                    break
+        self.warn(f"the record of {stage}/{key[:SHORT]} is damaged {self._put_aside(path)}")
+        return None
 
     def index(self) -> list[tuple[str, str]]:
         """(stage, key) of every record, by stage."""
@@ -121,14 +126,18 @@ class Store:
     def read(self, record: Record) -> Packed:
         """The verified content. Raises ``DamagedArtefactError`` after putting a damaged object aside."""
         path = self.path(record)
-        try:
-            with reading_errors(path):
-                return _verified(path, record)
-        except FileNotFoundError as error:
-            raise DamagedArtefactError(f"the object of {record.name} is missing") from error
-        except UntrustedFileError as error:
-            reason = f"the object of {record.name} is damaged {self._put_aside(path)}: {error}"
-            raise DamagedArtefactError(reason) from error
+        for _ in range(AGAIN):
+            before = _identity(path)
+            try:
+                with reading_errors(path):
+                    return _verified(path, record)
+            except FileNotFoundError as error:
+                raise DamagedArtefactError(f"the object of {record.name} is missing") from error
+            except UntrustedFileError as error:
+                why = error
+                if _identity(path) == before:
+                    break
+        raise DamagedArtefactError(f"the object of {record.name} is damaged {self._put_aside(path)}: {why}") from why
 
     # writing
 
@@ -220,6 +229,15 @@ class Store:
         except OSError:
             return "and cannot be put aside in a read-only store"
         return "and was put aside"
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Which file lies at ``path``: one that is found damaged may have been put right by another process."""
+    try:
+        about = path.lstat()
+    except OSError:
+        return None
+    return about.st_dev, about.st_ino
 
 
 def _verified(path: Path, record: Record) -> Packed:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import time
 
 import pytest
 
@@ -14,6 +15,7 @@ from koopcli.errors import InvalidValueError, StorageError
 from koopcli.stages import recipes
 from koopcli.stages.ahead import make_ahead
 from koopcli.stages.pipeline import Pipeline
+from koopcli.stages.registry import STAGES
 from koopcli.stages.workers import Workers
 from koopcli.store import Store
 from tests.stages.test_pipeline import SMALL, Listener
@@ -68,8 +70,9 @@ def test_leaving_by_an_error_stops_the_workers():
 
     with pytest.raises(ZeroDivisionError), Workers(2) as workers:
         go_wrong(workers)
-    for process in multiprocessing.active_children():
-        process.join(10)
+    until = time.monotonic() + 20
+    while multiprocessing.active_children() and time.monotonic() < until:
+        time.sleep(0.05)
     assert not multiprocessing.active_children()
 
 
@@ -153,7 +156,7 @@ def test_without_locks_chunks_may_be_cleared_while_they_are_joined(tmp_path, alo
 
     from koopcli.store import parts
 
-    monkeypatch.setattr(parts, "SMALL", 0)  # chunks stay on disk
+    monkeypatch.setattr(parts, "HELD", 0)  # chunks stay on disk
     monkeypatch.setattr(Store, "lock", lambda self, key, name: nullcontext())
     task = recipes.simulation(load_experiment("paper", parse_set(CHUNKED)))
     real, calls = Store.commit, []
@@ -169,3 +172,68 @@ def test_without_locks_chunks_may_be_cleared_while_they_are_joined(tmp_path, alo
     assert calls.count("simulate") == 2
     assert made.cached
     assert made.record.object == alone[made.record.name]
+
+
+def test_chunks_beyond_what_is_held_in_memory_are_the_same(tmp_path, alone, monkeypatch):
+    from koopcli.store import parts
+
+    monkeypatch.setattr(parts, "HELD", 40_000)  # some are held, some are not
+    store = Store(tmp_path)
+    Pipeline(store, Listener()).make(recipes.evaluation(load_experiment("paper", parse_set(CHUNKED))))
+    assert objects(store) == alone
+
+
+def test_a_worker_whose_inputs_are_gone_leaves_its_chunk_to_the_command(tmp_path, alone, monkeypatch):
+    """As when somebody collects what is in use: the command has read it already."""
+    from koopcli.stages import chunks
+
+    store = Store(tmp_path)
+    task = recipes.simulation(load_experiment("paper", parse_set(CHUNKED)))
+    real = Workers.each
+
+    def collected(self, function, jobs):
+        for path in (store.root / "records" / "sample").iterdir():
+            path.unlink()
+        chunks._content.cache_clear()
+        return real(self, function, jobs)
+
+    monkeypatch.setattr(Workers, "each", collected)
+    with Workers(2) as workers:
+        made = Pipeline(store, Listener(), workers).make(task)
+    assert made.record.object == alone[made.record.name]
+
+
+def test_chunks_that_are_there_need_no_room_again(tmp_path, monkeypatch):
+    """With room for the whole and one chunk more, an interrupted simulation ends."""
+    from koopcli.stages import chunks
+    from koopcli.store import files
+
+    store, real, left = Store(tmp_path), chunks.commit, 19
+    task = recipes.simulation(load_experiment("paper", parse_set(CHUNKED)))
+
+    def breaking(chunk):
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise KeyboardInterrupt
+        return real(chunk)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(chunks, "commit", breaking)
+        with pytest.raises(KeyboardInterrupt):
+            Pipeline(store, Listener()).make(task)
+    needed = STAGES["simulate"].estimate(task).bytes
+    monkeypatch.setattr(files, "_free", lambda path: 1.1 * needed)
+    Pipeline(store, Listener()).make(task)
+    with pytest.raises(StorageError, match="needed"):
+        Pipeline(Store(tmp_path / "other"), Listener()).make(task)
+
+
+def test_a_worker_that_is_killed_ends_making_ahead(tmp_path, monkeypatch):
+    """Its job was the last one: nothing else would notice."""
+    from koopcli.stages import ahead
+
+    monkeypatch.setattr(ahead, "make", end)
+    task = recipes.sample(load_experiment("paper", {}).sample("grid"))
+    with pytest.raises(InvalidValueError, match="fewer --workers"), Workers(2) as workers:
+        make_ahead(Pipeline(Store(tmp_path), Listener(), workers), [task])

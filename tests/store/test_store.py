@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from filelock import FileLock
 
-from koopcli.errors import DamagedArtefactError, LockTimeoutError, NewerFormatError, StorageError, UnknownNameError
+from koopcli.errors import (
+    DamagedArtefactError,
+    InvalidValueError,
+    LockTimeoutError,
+    NewerFormatError,
+    StorageError,
+    UnknownNameError,
+)
 from koopcli.records import Array, Packed
 from koopcli.store import Store, image
 from koopcli.store.files import make_folder, publish, size_text, sweep
@@ -221,14 +228,17 @@ def test_a_file_system_without_locks_is_a_warning(store, monkeypatch, error):
 
 def test_parts_are_verified_and_cleared(store):
     parts = store.parts("k" * 64)
-    assert parts.read(0) is None
+    assert parts.read(range(20)) == {}
     parts.commit(0, packed(1.0))
     parts.commit(10, packed(2.0))
-    assert parts.read(0).meta["value"] == 1.0
-    assert parts.read(1) is None
+    parts.commit(12, packed(3.0))
+    assert {i: found.meta["value"] for i, found in parts.read({0, 1, 10}).items()} == {0: 1.0, 10: 2.0}
+    assert parts.size() == sum(path.stat().st_size for path in (store.root / "partial").rglob("*.h5"))
     (path,) = (store.root / "partial").rglob("10-*.h5")
     path.write_bytes(path.read_bytes()[:-1])
-    assert parts.read(10) is None
+    assert parts.read(range(20)).keys() == {0, 12}
+    os.mkfifo(path.parent / f"13-{'0' * 64}.h5")
+    assert parts.read(range(20)).keys() == {0, 12}
     parts.clear()
     assert not (store.root / "partial" / ("k" * 64)).exists()
 
@@ -293,3 +303,67 @@ def test_where_the_store_is(monkeypatch, tmp_path):
 
 def test_sizes_for_people():
     assert [size_text(n) for n in (0, 999, 1500, 2.5e9)] == ["0 B", "999 B", "1.5 kB", "2.5 GB"]
+
+
+@pytest.mark.parametrize("what", ["object", "record"])
+def test_what_others_have_put_right_is_not_put_aside(store, monkeypatch, what):
+    """Two readers meet the same damage; the slower one finds it mended by the quicker."""
+    from koopcli.store import store as module
+
+    record = commit(store)
+    path = store.path(record) if what == "object" else store.root / "records" / "sample" / f"{record.key}.json"
+    good = path.read_bytes()
+    path.write_bytes(good[:-9])
+    read = "_verified" if what == "object" else "read_small"
+    real, calls = getattr(module, read), []
+
+    def mended(*args):
+        calls.append(args)
+        try:
+            return real(*args) if len(calls) > 1 or what == "object" else good[:-9]
+        finally:
+            publish(path, good, store.root / "tmp")
+
+    monkeypatch.setattr(module, read, mended)
+    if what == "object":
+        assert (store.read(record).arrays["x"].values == 1).all()
+    else:
+        assert store.record("sample", record.key) == record
+    assert len(calls) == 2
+    assert not (store.root / "quarantine").exists()
+
+
+def test_a_large_object_is_read_though_it_is_replaced_or_removed_meanwhile(store, monkeypatch):
+    monkeypatch.setattr(image, "IMAGE_LIMIT", 100)
+    monkeypatch.setattr(image, "MEMORY_LIMIT", 100)
+    record = store.commit(recipe(), {}, packed(n=10_000), {})
+    real = image.from_open
+
+    def overtaken(opened):
+        store.path(record).unlink()
+        return real(opened)
+
+    monkeypatch.setattr(image, "from_open", overtaken)
+    found = store.read(record)
+    assert (found.arrays["x"].values[...] == 1).all()
+
+
+@pytest.mark.parametrize("text", ["nan", "inf", "-1", "soon"])
+def test_an_odd_time_to_wait_is_refused(store, monkeypatch, text):
+    monkeypatch.setenv("KOOP_LOCK_TIMEOUT", text)
+    make_folder(store.root / "locks")
+    with (
+        FileLock(store.root / "locks" / "abc.lock"),
+        pytest.raises(InvalidValueError, match="KOOP_LOCK_TIMEOUT"),
+        Store(store.root).lock("abc", "sample/abc"),
+    ):
+        pass
+
+
+@pytest.mark.parametrize(
+    "change", [{"version": None}, {"settings": None}, {"inputs": None}, {"inputs": {"of": "x"}}, {"version": True}]
+)
+def test_a_record_that_says_too_little_is_damaged(store, change):
+    bad = {name: value for name, value in {**recipe(), **change}.items() if value is not None}
+    record = store.commit(bad, {}, packed(), {})
+    assert store.record("sample", record.key) is None
