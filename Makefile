@@ -28,7 +28,7 @@ smoke: $(VENV)/.installed ## Run both methods on reduced datasets, in a store of
 	$(KOOP) reproduce all --smoke --store "$$store" 2>/dev/null
 
 test: $(VENV)/.developing ## Run the tests, on every core
-	$(BIN)/python -m pytest -n auto --dist worksteal
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal
 
 check: $(VENV)/.developing ## Lint, types and the direction of imports
 	$(BIN)/ruff format --check .
