@@ -24,6 +24,7 @@ from koopcli.errors import DamagedArtefactError, StorageError
 from koopcli.store import Record, Store, image
 from tests.writer import KEYS, commit, content
 
+UNFINISHED = "f" * 64
 CALLS = ("open", "pwrite", "fsync", "replace", "mkdir", "posix_fallocate")
 
 
@@ -110,30 +111,38 @@ def failing(call: str, n: int, code: int) -> Iterator[Callable[[], int]]:
 def errors(folder: Path, code: int) -> Count:
     """An error at the n-th call of each kind, for every n of a commit: the old state is left, or the new.
 
-    Once for what is laid out in memory, and once for what is large.
+    For what is laid out in memory, for what is large, and for a chunk.
     """
     count, usual = Count(), image.IMAGE_LIMIT
-    for limit in (usual, 0):
+    for what, limit, put in (("small", usual, commit), ("large", 0, commit), ("chunk", usual, chunk)):
         for call in CALLS:
             reached, n = True, 0
             while reached:
                 n += 1
-                root = folder / f"{limit}-{call}-{n}"
-                old, done = commit(Store(root), 0).key, set()
+                root, done = folder / f"{what}-{call}-{n}", False
+                old = commit(Store(root), 0).key
                 image.IMAGE_LIMIT = limit
                 try:
                     with failing(call, n, code) as calls:
                         try:
-                            done = {commit(Store(root), 1).key}
+                            put(Store(root), 1)
+                            done = True
                         except StorageError:
                             count.struck += 1
                         reached = calls() >= n
                 finally:
                     image.IMAGE_LIMIT = usual
                 count.injected += reached
-                settle(Store(root), {old} | done, count)
+                settle(Store(root), {old}, count)
+                found = len(Store(root).index()) > 1 or 1 in Store(root).parts(UNFINISHED).read({1})
+                count.lost += done and not found
                 count.accepted += len(list((root / "tmp").iterdir()))
     return count
+
+
+def chunk(store: Store, seed: int) -> None:
+    """Commit a chunk of something unfinished."""
+    store.parts(UNFINISHED).commit(seed, content(seed))
 
 
 def damage(folder: Path, flips: int, cuts: int, seed: int = 0) -> tuple[Count, Count]:

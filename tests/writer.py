@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from koopcli.records import Array, Packed
-from koopcli.store import Record, Store
+from koopcli.store import Record, Store, image
 from koopcli.store.identity import SCHEMA
 
 KEYS = 40
@@ -29,7 +29,9 @@ def commit(store: Store, seed: int) -> Record:
 
 def main(root: str, first: int, count: int) -> None:
     store = Store(Path(root))
+    usual = image.IMAGE_LIMIT
     for seed in range(first, first + count):
+        image.IMAGE_LIMIT = 0 if seed % 2 else usual  # every other one as if it were large
         commit(store, seed % KEYS)
         print(seed % KEYS, flush=True)
 
