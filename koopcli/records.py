@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -222,6 +223,10 @@ class Trajectories:
 
     def finished(self) -> Trajectories:
         """Those that ran their whole length; the product structure is lost with any that did not."""
+        return self._finished
+
+    @cached_property
+    def _finished(self) -> Trajectories:
         if self.course is None or self.course.finished.all():
             return self
         kept = self.course.finished

@@ -63,7 +63,6 @@ def _described(one: Ancestor) -> dict[str, Any]:
 
 
 def _name(one: Ancestor) -> str:
-    from koopcli.store.records import SHORT
+    from koopcli.store.records import short_name
 
-    stage, _, key = one.full.partition("/")
-    return f"{stage}/{key[:SHORT]}"
+    return short_name(one.full)

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import os
 import re
-import secrets
-import socket
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -18,7 +16,7 @@ from pathlib import Path
 
 from koopcli.errors import DamagedArtefactError, StorageError
 from koopcli.progress import Progress, silent
-from koopcli.store.files import DAY, HOUR, make_folder, printable, storage_errors
+from koopcli.store.files import DAY, HOUR, make_folder, own_name, printable, storage_errors
 from koopcli.store.locks import if_free
 from koopcli.store.store import Store
 from koopcli.store.survey import DIGEST, File, Recorded, Survey, look, object_path, pinned, records, survey
@@ -179,7 +177,7 @@ def _unfinished(store: Store, there: Survey, before: float) -> Iterator[Removal]
 def _clock(store: Store, there: Survey, delete: bool) -> tuple[float, str]:
     """Now, by the file system that gave the files their times, and how it was found where not in the usual way."""
     temporary = store.root / "tmp"
-    probe = temporary / _own()
+    probe = temporary / own_name()
     try:
         with storage_errors(temporary):
             make_folder(temporary)
@@ -238,7 +236,7 @@ def _remove_files(store: Store, one: Removal) -> bool:
 def _remove_objects(store: Store, digests: set[str], there: Survey) -> set[str]:
     """Remove objects that no record names; returns those that are still there."""
     away: dict[str, Path] = {}
-    suffix = _own()
+    suffix = own_name()
     for digest in sorted(digests):
         path = object_path(store.root, digest)
         with suppress(FileNotFoundError):
@@ -282,11 +280,6 @@ def _put_back(store: Store, there: Survey) -> None:
 def _free(lock: Path) -> bool:
     with if_free(lock) as free:
         return free
-
-
-def _own() -> str:
-    """A name that no other process gives to a file."""
-    return f"{os.getpid()}-{secrets.token_hex(8)}@{socket.gethostname()}"
 
 
 def _relative(store: Store, file: File) -> str:

@@ -77,7 +77,7 @@ def publish(target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path]
     finished file; ``temporary`` is a folder on the same file system.
     """
     make_folder(temporary)
-    beside = temporary / f"{os.getpid()}-{secrets.token_hex(8)}@{socket.gethostname()}"
+    beside = temporary / own_name()
     try:
         if isinstance(fill, bytes):
             _write_new(beside, fill)
@@ -94,6 +94,11 @@ def publish(target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path]
         raise
     _fsync(final.parent)
     return Published(final, about.st_size, about.st_mtime)
+
+
+def own_name() -> str:
+    """A name that no other process gives to a file, and that says which process gave it."""
+    return f"{os.getpid()}-{secrets.token_hex(8)}@{socket.gethostname()}"
 
 
 def sha256_file(path: Path) -> str:

@@ -80,12 +80,6 @@ def loaded(packed: Packed) -> Packed:
     return Packed({path: Array(a.values[...], a.axes, a.units) for path, a in packed.arrays.items()}, packed.meta)
 
 
-def from_file(path: Path) -> Packed:
-    """The record of a file; arrays that are large stay on disk. Raises ``UntrustedFileError``."""
-    with open_regular(path) as (opened, _):
-        return from_open(opened)
-
-
 def from_open(opened: io.FileIO) -> Packed:
     """The record of that very file, whatever its path leads to by now; arrays that are large stay on disk."""
     with refusals(), mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as content:
@@ -123,7 +117,7 @@ def read_foreign(path: Path) -> Packed:
 
 
 def from_path(path: Path) -> Packed:
-    """The record of a file that is opened for the time of a read only, its arrays left on disk."""
+    """The record of a file that is open only while it is read, as one of many; its arrays stay on disk."""
     with refusals(), h5py.File(path, "r", locking=False) as file:
         with mmap.mmap(file.id.get_vfd_handle(), 0, access=mmap.ACCESS_READ) as content:
             lazy = _packed(file, Texts(content))

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from koopcli.errors import UnknownNameError
-from koopcli.store.files import UntrustedFileError, printable, publish, read_small, storage_errors
-from koopcli.store.records import Record, is_name
+from koopcli.store.files import printable, publish, reading_errors, storage_errors
+from koopcli.store.records import Record
 from koopcli.store.store import Store
+from koopcli.store.survey import pinned
 
 
 def pin(store: Store, label: str, records: Sequence[Record]) -> None:
@@ -34,18 +35,13 @@ def unpin(store: Store, label: str) -> None:
 
 def pins(store: Store) -> dict[str, list[str]]:
     """label -> names "stage/key" that it keeps; a damaged pin keeps nothing and is warned about."""
-    found: dict[str, list[str]] = {}
-    for path in sorted((store.root / "refs").glob("*.json")):
-        found[path.stem] = []
-        try:
-            names = json.loads(read_small(path))["names"]
-            if not isinstance(names, list) or not all(map(is_name, names)):
-                raise ValueError
-            found[path.stem] = names
-        except (OSError, UntrustedFileError, ValueError, KeyError, TypeError, RecursionError):
-            label = printable(path.stem)
-            store.warn(f"the pin {label} is damaged: `koop unpin {label}`, and pin again")
-    return found
+    with reading_errors(store.root):
+        found = pinned(store.root)
+    for label, names in found.items():
+        if names is None:
+            known = printable(label)
+            store.warn(f"the pin {known} is damaged: `koop unpin {known}`, and pin again")
+    return {label: names or [] for label, names in found.items()}
 
 
 def label_of(record: Record) -> str:

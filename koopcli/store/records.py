@@ -91,6 +91,12 @@ def is_name(name: object) -> bool:
     return bool(STAGE.fullmatch(stage) and DIGEST.fullmatch(key))
 
 
+def short_name(name: str) -> str:
+    """ "stage/key" as commands print it."""
+    stage, _, key = name.partition("/")
+    return f"{stage}/{key[:SHORT]}"
+
+
 def _well_formed(record: Record) -> bool:
     """Whether each entry has its form: paths are made of them."""
     return (

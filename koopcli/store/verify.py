@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -9,8 +10,8 @@ from pathlib import Path
 
 from koopcli.progress import Progress, silent
 from koopcli.records import Packed
-from koopcli.store.files import HOUR, UntrustedFileError, open_regular, sha256_file, size_text
-from koopcli.store.records import SHORT, Record
+from koopcli.store.files import HOUR, UntrustedFileError, open_regular, size_text
+from koopcli.store.records import Record, short_name
 from koopcli.store.store import Store
 from koopcli.store.survey import Recorded, Survey, object_path, survey
 
@@ -40,8 +41,7 @@ class Finding:
     @property
     def name(self) -> str:
         """The artefact's name, as commands print it."""
-        stage, _, key = self.artefact.partition("/")
-        return f"{stage}/{key[:SHORT]}" if key else ""
+        return short_name(self.artefact) if self.artefact else ""
 
     @property
     def damage(self) -> bool:
@@ -82,7 +82,7 @@ def _records(store: Store, there: Survey) -> Iterator[Finding]:
         else:
             for role, name in one.record.lineage.items():
                 if name not in there.records:
-                    yield Finding("input gone", path, f"its {role}, {_short(name)}, is no longer here", full)
+                    yield Finding("input gone", path, f"its {role}, {short_name(name)}, is no longer here", full)
 
 
 @dataclass
@@ -142,10 +142,10 @@ class _Objects:
         return self.opens(one.record, self.store.inspect(one.record))
 
     def _unused(self, path: Path, digest: str) -> tuple[str, str]:
-        with open_regular(path) as (_, size):
+        with open_regular(path) as (file, size):
             if self.opens is not None:
                 self.read += size
-                if sha256_file(path) != digest:
+                if hashlib.file_digest(file, "sha256").hexdigest() != digest:
                     return "damaged object", "its bytes do not match its name; no record names it"
         return "orphan object", f"{size_text(size)} that no record names: see koop gc"
 
@@ -157,7 +157,7 @@ def _pins(store: Store, there: Survey) -> Iterator[Finding]:
             yield Finding("damaged pin", path, f"does not say what it keeps: koop unpin {label}, and pin again")
         for name in names or []:
             if name not in there.records:
-                what = f"keeps {_short(name)}, which is gone: make it again, or koop unpin {label}"
+                what = f"keeps {short_name(name)}, which is gone: make it again, or koop unpin {label}"
                 yield Finding("pin of nothing", path, what, name)
 
 
@@ -177,11 +177,6 @@ def _beside(store: Store, there: Survey) -> Iterator[Finding]:
             yield Finding("temporary file", _relative(store, file.path), "left by a process that was cut off")
     for file in there.foreign:
         yield Finding("foreign file", _relative(store, file.path), "not written by koop; left alone")
-
-
-def _short(full: str) -> str:
-    stage, _, key = full.partition("/")
-    return f"{stage}/{key[:SHORT]}"
 
 
 def _relative(store: Store, path: Path) -> str:

@@ -95,7 +95,7 @@ def test_two_terminals_make_one_artefact_once(folder):
 
 def test_bars_on_a_terminal_and_nothing_of_them_on_stdout(folder):
     ours, theirs = pty.openpty()
-    command = [*KOOP, "reproduce", "--experiment", "../tiny.toml"]
+    command = [*KOOP, "reproduce", "--experiment", "../tiny.toml", "--workers", "2"]
     environment = {**os.environ, "TERM": "xterm"}
     with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=theirs, env=environment) as process:
         os.close(theirs)

@@ -251,3 +251,13 @@ def test_a_clock_ten_years_off_changes_nothing(folder):
     assert kept.items() <= objects(store).items()
     assert len(objects(store)) > len(kept)
     assert list((store / "tmp").glob(f"{os.getpid()}-*"))
+
+
+@pytest.mark.parametrize(("said", "used"), [(None, "1"), ("2", "2")])
+def test_blas_has_one_thread_unless_the_user_says_otherwise(folder, said, used):
+    """The number of threads moves last bits, so they would depend on the number of workers."""
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    environment |= {"OPENBLAS_NUM_THREADS": said} if said else {}
+    command = [*KOOP, "sample", "--experiment", "../tiny.toml"]
+    name = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True).stdout
+    assert Store(folder / "artefacts").find(name.strip()).provenance["blas_threads"] == used

@@ -127,10 +127,11 @@ def test_what_cannot_be_made_ahead_is_met_in_its_place(tmp_path):
             pipeline.make(bad)
 
 
-def test_simulations_are_resumed_chunk_by_chunk(tmp_path, alone, monkeypatch):
+def break_off(store: Store, task, done: int, monkeypatch) -> None:
+    """Interrupt the making of ``task`` when so many of its chunks are there."""
     from koopcli.stages import chunks
 
-    store, real, left = Store(tmp_path), chunks.commit, 3
+    real, left = chunks.commit, done
 
     def breaking(chunk):
         nonlocal left
@@ -139,11 +140,16 @@ def test_simulations_are_resumed_chunk_by_chunk(tmp_path, alone, monkeypatch):
             raise KeyboardInterrupt
         return real(chunk)
 
-    task = recipes.simulation(load_experiment("paper", parse_set(CHUNKED)))
     with monkeypatch.context() as patch:
         patch.setattr(chunks, "commit", breaking)
         with pytest.raises(KeyboardInterrupt):
             Pipeline(store, Listener()).make(task)
+
+
+def test_simulations_are_resumed_chunk_by_chunk(tmp_path, alone, monkeypatch):
+    store = Store(tmp_path)
+    task = recipes.simulation(load_experiment("paper", parse_set(CHUNKED)))
+    break_off(store, task, 3, monkeypatch)
     heard = Listener()
     made = Pipeline(store, heard).make(task)
     assert "3 of 20 chunks were already there" in heard.notes
@@ -205,23 +211,11 @@ def test_a_worker_whose_inputs_are_gone_leaves_its_chunk_to_the_command(tmp_path
 
 def test_chunks_that_are_there_need_no_room_again(tmp_path, monkeypatch):
     """With room for the whole and one chunk more, an interrupted simulation ends."""
-    from koopcli.stages import chunks
     from koopcli.store import files
 
-    store, real, left = Store(tmp_path), chunks.commit, 19
+    store = Store(tmp_path)
     task = recipes.simulation(load_experiment("paper", parse_set(CHUNKED)))
-
-    def breaking(chunk):
-        nonlocal left
-        left -= 1
-        if left < 0:
-            raise KeyboardInterrupt
-        return real(chunk)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(chunks, "commit", breaking)
-        with pytest.raises(KeyboardInterrupt):
-            Pipeline(store, Listener()).make(task)
+    break_off(store, task, 19, monkeypatch)
     needed = STAGES["simulate"].estimate(task).bytes
     monkeypatch.setattr(files, "_free", lambda path: 1.1 * needed)
     Pipeline(store, Listener()).make(task)

@@ -71,6 +71,6 @@ def test_the_digest_does_not_see_how_the_content_is_stored(tmp_path):
     fortran = packed(np.asfortranarray(np.arange(6.0).reshape(2, 3)))
     big_endian = packed(np.arange(6.0).reshape(2, 3).astype(">f8"))
     image.to_file(one, tmp_path / "x.h5")
-    for other in (fortran, big_endian, image.from_bytes(image.to_bytes(one)), image.from_file(tmp_path / "x.h5")):
+    for other in (fortran, big_endian, image.from_bytes(image.to_bytes(one)), image.from_path(tmp_path / "x.h5")):
         assert data_digest(other) == data_digest(one)
     assert image.to_bytes(fortran) == image.to_bytes(one) == image.to_bytes(big_endian)

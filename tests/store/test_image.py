@@ -36,7 +36,7 @@ def test_every_dataset_is_contiguous_and_carries_units_and_axes(tmp_path):
 def test_there_and_back(tmp_path):
     packed = Packed({"x": Array(np.arange(12).reshape(3, 4), ("a", "b"), "1")}, {"n": None, "f": 0.1, "l": [1, "é"]})
     image.to_file(packed, tmp_path / "x.h5")
-    for again in (image.from_bytes(image.to_bytes(packed)), image.from_file(tmp_path / "x.h5")):
+    for again in (image.from_bytes(image.to_bytes(packed)), image.from_path(tmp_path / "x.h5")):
         assert again.meta == packed.meta
         assert again.arrays["x"].axes == ("a", "b")
         assert (again.arrays["x"].values[...] == packed.arrays["x"].values).all()
