@@ -18,6 +18,7 @@ from koopcli.koopman import edmd
 from koopcli.koopman.bases import Choice
 from koopcli.koopman.evaluation import Evaluation, evaluate
 from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.transitions import Transitions
 from koopcli.records import FloatArray, Sample, Trajectories
 from koopcli.simulation import sampling
 from koopcli.simulation.integrate import simulate
@@ -53,7 +54,7 @@ def triangle(data: Trajectories, order: int) -> tuple[FloatArray, FloatArray]:
     """V and Y of the regression on raw monomials and inputs, as many rows as columns."""
     basis = edmd.basis_from_data(data, Choice("tensor", order, raw=True))
     kept = np.empty((0, 2 * basis.functions + len(data.input_channels)))
-    for x, u, x_next in data.transitions(16384):
+    for x, u, x_next in Transitions.of(data).blocks(16384):
         rows = np.hstack([basis.lift(x), u, basis.lift(x_next)])
         kept = np.linalg.qr(np.vstack([kept, rows]), mode="r")
     columns = basis.functions + len(data.input_channels)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
@@ -237,16 +237,6 @@ class Trajectories:
     def factors(self) -> tuple[int, int] | None:
         """``product``, where every trajectory is one step and its structure carries over to the transitions."""
         return self.product if self.steps == 1 else None
-
-    def transitions(self, rows: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-        """One-step pairs (x, u, x⁺) in blocks of at most ``rows``; no pair spans two trajectories."""
-        n_x, n_u = self.x.shape[2], self.u.shape[2]
-        block = max(1, rows // self.steps)
-        for start in range(0, len(self), block):
-            chosen = slice(start, start + block)
-            for k in range(0, self.steps, rows):
-                x, u = self.x[chosen, k : k + rows + 1], self.u[chosen, k : k + rows]
-                yield x[:, :-1].reshape(-1, n_x), u.reshape(-1, n_u), x[:, 1:].reshape(-1, n_x)
 
     def pack(self) -> Packed:
         """The trajectories for storage."""

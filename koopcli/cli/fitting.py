@@ -39,8 +39,12 @@ DATA = ("sample", "vehicle", "simulate")  # the sections behind trajectories
 
 def fit_edmd(
     trajectories: Annotated[
-        str | None,
-        typer.Argument(autocompletion=complete_name, help="Trajectories; made from the settings when left out."),
+        list[str] | None,
+        typer.Argument(
+            metavar="[TRAJECTORIES]...",
+            autocompletion=complete_name,
+            help="Trajectories, or several of one plant to fit together; made from the settings when left out.",
+        ),
     ] = None,
     order: Annotated[int | None, typer.Option(help=f"Highest degree of each state ({FitEdmd.order}).")] = None,
     vehicle: VehicleOption = None,
@@ -116,8 +120,8 @@ def fit_edmd(
     call = begin(store, experiment, set_, (*DATA, "fit-edmd"), given)
     from koopcli.stages import recipes
 
-    of = call.named(trajectories, ["simulate"], "the TRAJECTORIES", ("fit-edmd",)) if trajectories else None
-    call.run(recipes.fit_edmd(call.experiment, of), as_json=as_json, dry_run=dry_run)
+    of = [call.named(name, ["simulate"], "the TRAJECTORIES", ("fit-edmd",)) for name in trajectories or []]
+    call.run(recipes.fit_edmd(call.experiment, *of), as_json=as_json, dry_run=dry_run)
 
 
 def fit_eigen(

@@ -93,6 +93,10 @@ class FitEdmd:
         "orthonormal", help="least squares; cholesky-monomials shows where the textbook's normal equations end"
     )
 
+    chunk: int = setting(
+        1_000_000, low=1, high=10**9, help="samples for each committed part of sums; a product dataset has none"
+    )
+
     def settled(self) -> FitEdmd:
         """The same fit with everything that its basis does not use at its default."""
         idle = {name for names in OF_BASIS.values() for name in names} - set(OF_BASIS[self.basis])

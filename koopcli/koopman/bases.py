@@ -10,6 +10,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from koopcli.koopman.lifts import Lift, Observed
+from koopcli.koopman.moments import Products
 from koopcli.koopman.polynomial import FAMILIES, Polynomial, polynomial
 from koopcli.koopman.thin_plate import ThinPlate, thin_plate_basis
 from koopcli.records import FloatArray, Packed
@@ -26,6 +27,13 @@ class Basis(Lift, Protocol):
     def state_map(self) -> FloatArray:
         """C (n_x, N) with x = C ψ(x) exactly: every basis holds the states themselves."""
 
+    def lift_rows(self, x: FloatArray, out: FloatArray) -> None:
+        """ψ(x) of the states (n, n_x) as rows into ``out`` (N, n), which is contiguous."""
+
+    @property
+    def products(self) -> Products | None:
+        """How the products of two observables are sums of fewer functions (3.5), where they are."""
+
     def group_moments(self, x: FloatArray, weights: FloatArray) -> FloatArray:
         """Σ_j weights[j] ψ(x[s, j]) as (n, q, N), for states in groups (n, m, n_x) and weights (m, q)."""
 
@@ -37,6 +45,7 @@ class States:
     functions: int
 
     constant: ClassVar[None] = None
+    products: ClassVar[None] = None
 
     @property
     def state_map(self) -> FloatArray:
@@ -46,6 +55,10 @@ class States:
     def lift(self, x: FloatArray) -> FloatArray:
         """The states themselves."""
         return np.asarray(x, dtype=float)
+
+    def lift_rows(self, x: FloatArray, out: FloatArray) -> None:
+        """ψ(x) of the states (n, n_x) as rows into ``out`` (N, n)."""
+        out[:] = self.lift(x).T
 
     def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
         """rows · x as (n, R), for ``rows`` (R, n_x)."""

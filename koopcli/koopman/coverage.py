@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -62,26 +60,20 @@ class Coverage:
         return cKDTree(_in_half_widths(self.states, self.domain))
 
 
-def coverage_of(blocks: Callable[[], Iterable[FloatArray]], total: int) -> Coverage:
-    """The coverage of the ``total`` training states that each call of ``blocks()`` yields as (rows, n_x).
+def coverage_of(states: FloatArray, corners: FloatArray | None = None) -> Coverage:
+    """The coverage of the training ``states`` (m, n_x), or of more that their hull and box hang on at ``corners``.
 
-    All of them shape the domain and the hull; ``STATES_LIMIT`` at most, spread evenly, are kept to measure distances
-    from. States that lie in a plane have no hull; the box of the domain stands for it.
+    ``STATES_LIMIT`` of them at most, spread evenly, are kept to measure distances from. States that lie in a plane have
+    no hull; the box of the domain stands for it.
     """
-    chosen, found, start = spread(total, STATES_LIMIT), [], 0
-    corners: FloatArray | None = None
-    for x in blocks():
-        first, last = np.searchsorted(chosen, [start, start + len(x)])
-        found.append(x[chosen[first:last] - start])
-        start += len(x)
-        corners = _corners(x if corners is None else np.concatenate([corners, x]))
-    assert corners is not None, "there is at least one block"
+    if corners is None:
+        corners = corners_of(states)
     domain = np.stack([corners.min(axis=0), corners.max(axis=0)])
     n_x = corners.shape[1]
     hull = _hull(_in_half_widths(corners, domain))
     box = np.hstack([np.vstack([np.eye(n_x), -np.eye(n_x)]), -np.ones((2 * n_x, 1))])
     facets = box if hull is None else np.unique(hull.equations, axis=0)
-    return Coverage(np.concatenate(found), domain, facets)
+    return Coverage(states[spread(len(states), STATES_LIMIT)], domain, facets)
 
 
 def spread(total: int, limit: int) -> IndexArray:
@@ -91,7 +83,7 @@ def spread(total: int, limit: int) -> IndexArray:
     return np.unique((np.arange(limit) * GOLDEN % 1.0 * total).astype(np.intp))
 
 
-def _corners(x: FloatArray) -> FloatArray:
+def corners_of(x: FloatArray) -> FloatArray:
     """The states that the hull and the box of ``x`` hang on; of a grid or a plane all, or the corners if too many."""
     hull = _hull(x)
     if hull is None and len(x) <= STATES_LIMIT:
@@ -118,8 +110,12 @@ def _hull(x: FloatArray) -> Any:
 
 def _fills_its_box(x: FloatArray) -> bool:
     """Whether ``x`` is a grid with every combination of its values, whose hull is its box."""
-    values = math.prod(len(np.unique(column)) for column in x.T)
-    return values <= len(x) and values == len(np.unique(x, axis=0))
+    values = 1
+    for column in x.T:
+        values *= len(np.unique(column))
+        if values > len(x):
+            return False
+    return values == len(np.unique(x, axis=0))
 
 
 def _in_half_widths(x: FloatArray, domain: FloatArray) -> FloatArray:

@@ -142,7 +142,7 @@ def _predictor(
         B=np.zeros((len(modes), len(trajectories.input_channels))),
         C=C,
         dt=trajectories.dt,
-        coverage=coverage_of(lambda: [states], len(states)),
+        coverage=coverage_of(states),
         state_channels=trajectories.state_channels,
         input_channels=trajectories.input_channels,
         rank=rank,

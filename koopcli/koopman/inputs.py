@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from koopcli.records import BoolArray, FloatArray
+from koopcli.records import Array, BoolArray, FloatArray, Packed
+
+STILL = 64 * np.finfo(float).eps  # of its mean: an input that moves by no more is still
 
 
 @dataclass(frozen=True)
@@ -25,29 +26,33 @@ class WhiteInputs:
 
     def __call__(self, u: FloatArray) -> FloatArray:
         """w (n, r) of ``u`` (n, n_u)."""
-        return _centred(u, self.mean) @ self.T
+        return np.asarray((u - self.mean) @ self.T)
+
+    def pack(self) -> Packed:
+        """What another process needs to apply them."""
+        return Packed({"mean": Array(self.mean, ("input",), "1"), "T": Array(self.T, ("input", "direction"), "1")})
+
+    @classmethod
+    def unpack(cls, packed: Packed) -> WhiteInputs:
+        """The inverse of :meth:`pack`, but for what only says how independent they are."""
+        mean, T = (packed.arrays[name].values[...] for name in ("mean", "T"))
+        return cls(mean, T, np.empty(0), T.any(axis=1))
 
 
-def white_inputs(blocks: Callable[[], Iterable[FloatArray]], *, centred: bool) -> WhiteInputs:
-    """The inputs that each call of ``blocks()`` yields as (rows, n_u), about their mean or about zero."""
-    total = sum(len(u) for u in blocks())
-    mean = np.asarray(sum(u.sum(axis=0) for u in blocks()) / total)
-    if not centred:
-        mean = np.zeros_like(mean)
-    triangle = np.empty((0, len(mean)))
-    for u in blocks():
-        triangle = np.asarray(np.linalg.qr(np.vstack([triangle, _centred(u, mean)]), mode="r"))
-    length = np.linalg.norm(triangle, axis=0)
-    moving = length > 0
-    _, singular, right = np.linalg.svd(triangle[:, moving] / length[moving], full_matrices=False)
+def white_inputs(triangle: FloatArray, *, centred: bool) -> WhiteInputs:
+    """The inputs about their mean or about zero, from the R (1 + n_u, 1 + n_u) of a QR factorisation of [1, u].
+
+    Its first row holds the sums over all samples, and what is below it the R of the inputs about their mean.
+    """
+    total = triangle[0, 0] ** 2
+    if centred:
+        mean, moved = triangle[0, 1:] / triangle[0, 0], triangle[1:, 1:]
+    else:
+        mean, moved = np.zeros(triangle.shape[1] - 1), np.asarray(np.linalg.qr(triangle[:, 1:], mode="r"))
+    length = np.linalg.norm(moved, axis=0)
+    moving = length > STILL * np.abs(mean) * np.sqrt(total)
+    _, singular, right = np.linalg.svd(moved[:, moving] / length[moving], full_matrices=False)
     keep = singular > singular.max(initial=0.0) * np.finfo(float).eps * total
     T = np.zeros((len(mean), int(keep.sum())))
     T[moving] = (right[keep].T / singular[keep]) / length[moving, np.newaxis] * np.sqrt(total)
     return WhiteInputs(mean, T, singular, moving)
-
-
-def _centred(u: FloatArray, u_mean: FloatArray) -> FloatArray:
-    """``u - u_mean`` with what is only rounding set to zero: an input that never moves determines nothing."""
-    centred = u - u_mean
-    centred[np.abs(centred) <= 64 * np.finfo(float).eps * np.abs(u_mean)] = 0.0
-    return centred

@@ -13,6 +13,7 @@ import numpy as np
 
 from koopcli.koopman.lifts import Observed
 from koopcli.koopman.modes import IndexArray
+from koopcli.koopman.moments import Products, products_of
 from koopcli.koopman.orthonormal import Monomials, OrthonormalPolynomials, orthonormal_polynomials
 from koopcli.records import Array, FloatArray, Packed
 
@@ -69,13 +70,19 @@ class Polynomial:
 
     def lift(self, x: FloatArray) -> FloatArray:
         """ψ(x) (n, N) of the states (n, n_x)."""
+        z = np.empty((self.functions, len(x)))
+        self.lift_rows(x, z)
+        return z.T
+
+    def lift_rows(self, x: FloatArray, out: FloatArray) -> None:
+        """ψ(x) of the states (n, n_x) as rows into ``out`` (N, n), which is contiguous."""
         *leading, last = [axis(x[:, i]) for i, axis in enumerate(self.axes)]  # (degree + 1, n) each
         degrees, choice = self._leading
-        head = np.ones((len(degrees), len(x)))
-        for i, factor in enumerate(leading):
-            head *= factor[degrees[:, i]]
-        z = (head[:, np.newaxis] * last).reshape(len(degrees) * len(last), len(x))
-        return (z if choice is None else z[choice]).T
+        head = _heads(leading, degrees, last[0])
+        if choice is None:
+            np.multiply(head[:, np.newaxis], last, out=out.reshape(len(head), len(last), len(x)))
+        else:
+            np.multiply(head[choice // len(last)], last[self.degrees[:, -1]], out=out)
 
     def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
         """rows · ψ(x) as (n, R), for ``rows`` (R, N)."""
@@ -94,14 +101,21 @@ class Polynomial:
         n, m, _ = x.shape
         *leading, last = [axis(x[..., i]) for i, axis in enumerate(self.axes)]  # (degree + 1, n, m) each
         degrees, choice = self._leading
-        head = np.ones((len(degrees), n, m))
-        for i, factor in enumerate(leading):
-            head *= factor[degrees[:, i]]
+        head = _heads(leading, degrees, last[0])
         tail = (weights.T[:, np.newaxis, np.newaxis, :] * last).reshape(-1, n, m)  # (q · last, n, m)
         both = np.matmul(head.transpose(1, 0, 2), tail.transpose(1, 2, 0))  # (n, head, q · last)
         q = weights.shape[1]
         moments = both.reshape(n, len(head), q, len(last)).transpose(0, 2, 1, 3).reshape(n, q, -1)
         return np.asarray(moments if choice is None else moments[:, :, choice])
+
+    @cached_property
+    def products(self) -> Products | None:
+        """Products of two observables by Legendre polynomials, where the family is all products of its factors."""
+        factors = [axis for axis in self.axes if isinstance(axis, OrthonormalPolynomials)]
+        heads = np.prod([axis.degree + 1 for axis in self.axes[:-1]])
+        degrees, choice = self._leading
+        every = choice is None and len(degrees) == heads
+        return products_of(factors) if every and len(factors) == len(self.axes) else None
 
     @cached_property
     def _leading(self) -> tuple[IndexArray, IndexArray | None]:
@@ -133,6 +147,16 @@ class Polynomial:
             else:
                 axes.append(Monomials(int(degree)))
         return cls(tuple(axes), degrees)
+
+
+def _heads(leading: Sequence[FloatArray], degrees: IndexArray, one: FloatArray) -> FloatArray:
+    """Products (rows, …) of the factors (degree + 1, …) of all states but the last, for each row of ``degrees``."""
+    if not leading:
+        return one[np.newaxis]
+    head = leading[0][degrees[:, 0]]
+    for i, factor in enumerate(leading[1:], 1):
+        head *= factor[degrees[:, i]]
+    return head
 
 
 Highest = tuple[int, ...]  # the highest degree of each state

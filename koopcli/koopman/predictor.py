@@ -34,7 +34,8 @@ class Predictor:
     ``generator`` (1 + n_u, N, N) in 1/s or None; ``dt`` in s; ``coverage``: where the training states lie; ``plant``
     what was identified, as JSON; ``rank`` of ``directions`` and ``condition`` of the regression; ``horizon``: the steps
     that it may be asked for, None for any; ``missed``: the share of the data in percent that its exponentials do not
-    hold; ``beyond``: what it does outside the hull of its data; ``trust``: an estimate of its errors.
+    hold; ``beyond``: what it does outside the hull of its data; ``trust``: an estimate of its errors; ``solved_by``:
+    how the regression was solved.
     """
 
     observables: Lift
@@ -56,6 +57,7 @@ class Predictor:
     missed: float | None = None
     beyond: str = EXTRAPOLATES
     trust: Trust | None = None
+    solved_by: str = ""
 
     @property
     def functions(self) -> int:
@@ -150,6 +152,7 @@ class Predictor:
             "directions": self.directions,
             "condition": self.condition if np.isfinite(self.condition) else None,
             "spectral_radius": self.spectral_radius,
+            "solved_by": self.solved_by,
             "horizon": self.horizon,
             "plant": self.plant,
             "missed": self.missed,
@@ -187,6 +190,7 @@ class Predictor:
             directions=meta["directions"],
             condition=np.inf if meta["condition"] is None else meta["condition"],
             spectral_radius=meta["spectral_radius"],
+            solved_by=meta["solved_by"],
             horizon=meta["horizon"],
             plant=meta["plant"],
             missed=meta["missed"],

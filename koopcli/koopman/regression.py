@@ -17,15 +17,19 @@ from koopcli.records import FloatArray
 RowBlocks = Callable[[], Iterable[tuple[FloatArray, FloatArray]]]
 
 GRAM_CONDITION = 1e6  # of VᵀV: up to it rounding leaves ten of sixteen digits
+ROUNDING = 64 * float(np.finfo(float).eps)  # of the entries of VᵀV, however it was summed
 
 
 @dataclass(frozen=True)
 class Solution:
-    """``coefficients`` (columns, targets), the ``singular_values`` of the scaled rows and their numerical ``rank``."""
+    """``coefficients`` (columns, targets), the ``singular_values`` of the scaled rows and their numerical ``rank``;
+    ``solved_by``: the way that was taken, in a word or two.
+    """
 
     coefficients: FloatArray
     singular_values: FloatArray
     rank: int
+    solved_by: str
 
     @property
     def condition(self) -> float:
@@ -40,12 +44,66 @@ def condition_number(singular_values: FloatArray) -> float:
 
 
 @dataclass(frozen=True)
-class _Normal:
-    """VᵀV and VᵀY over all ``rows``."""
+class Normal:
+    """VᵀV and VᵀY over all ``rows``; ``lost``: how much of its scaled entries the way of summing VᵀV has lost."""
 
     gram: FloatArray
     cross: FloatArray
     rows: int
+    lost: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.gram).all() and np.isfinite(self.cross).all()):
+            raise InvalidValueError("the training data hold values that are not finite: simulate a tamer sample")
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """Normal equations for columns of norm one, with the penalty of a ridge (4.7) on all but those that are free."""
+
+    normal: Normal
+    scale: FloatArray
+    penalty: FloatArray
+    gram: FloatArray
+    eigenvalues: FloatArray
+
+    @classmethod
+    def of(cls, normal: Normal, ridge: float = 0.0, free: Sequence[int] = ()) -> Scaled:
+        """The scaled equations; ``ridge`` times the sum of squares of the coefficients is added, but for ``free``."""
+        scale = np.sqrt(np.diag(normal.gram))
+        scale[scale == 0] = 1.0
+        penalty = np.full(len(scale), ridge)
+        penalty[list(free)] = 0.0
+        gram = normal.gram / np.outer(scale, scale) + np.diag(penalty)
+        return cls(normal, scale, penalty, gram, np.linalg.eigvalsh(gram))
+
+    @property
+    def condition(self) -> float:
+        """The condition number of the matrix itself, which is that of the rows squared."""
+        return float(self.eigenvalues[-1] / self.eigenvalues[0]) if self.eigenvalues[0] > 0 else float("inf")
+
+    @property
+    def harmless(self) -> bool:
+        """Whether their solution keeps its digits."""
+        determined = self.normal.rows >= len(self.gram) or bool(self.penalty.any())
+        return determined and self.condition * max(1.0, self.normal.lost / ROUNDING) < GRAM_CONDITION
+
+    def solution(self, solved_by: str) -> Solution:
+        """The coefficients of the columns as they are."""
+        W = np.linalg.solve(self.gram, self.normal.cross / self.scale[:, np.newaxis])
+        return Solution(W / self.scale[:, np.newaxis], np.sqrt(self.eigenvalues), len(self.gram), solved_by)
+
+    def by_triangle(self, triangle: FloatArray) -> Solution:
+        """The same minimum from the R of a QR factorisation of the rows [V / scale, Y]."""
+        columns = len(self.scale)
+        punished = np.diag(np.sqrt(self.penalty))[self.penalty > 0]
+        if len(punished):
+            triangle = add_rows(triangle, np.hstack([punished, np.zeros((len(punished), triangle.shape[1] - columns))]))
+        R, S = triangle[:columns, :columns], triangle[:columns, columns:]
+        U, singular, Vt = np.linalg.svd(R, full_matrices=False)
+        keep = singular > singular[0] * np.finfo(float).eps * max(self.normal.rows, columns)
+        W = Vt[keep].T @ ((U[:, keep].T @ S) / singular[keep][:, np.newaxis])
+        return Solution(W / self.scale[:, np.newaxis], singular, int(keep.sum()), "QR")
 
 
 def least_squares(blocks: RowBlocks, ridge: float = 0.0, free: Sequence[int] = ()) -> Solution:
@@ -55,20 +113,18 @@ def least_squares(blocks: RowBlocks, ridge: float = 0.0, free: Sequence[int] = (
     of squares of the coefficients of scaled columns is added (4.7), but for the columns ``free``. A direction below
     working precision is dropped, giving the solution of least norm; ``rank`` then tells.
     """
-    normal = _normal_equations(blocks)
-    scale = np.sqrt(np.diag(normal.gram))
-    scale[scale == 0] = 1.0
-    penalty = np.full(len(scale), ridge)
-    penalty[list(free)] = 0.0
-    gram = normal.gram / np.outer(scale, scale) + np.diag(penalty)
-    eigenvalues = np.linalg.eigvalsh(gram)
-    if eigenvalues[0] * GRAM_CONDITION > eigenvalues[-1] and (normal.rows >= len(gram) or ridge > 0):
-        W = np.linalg.solve(gram, normal.cross / scale[:, np.newaxis])
-        return Solution(W / scale[:, np.newaxis], np.sqrt(eigenvalues), len(gram))
-    return _by_qr(blocks, scale, normal.rows, penalty)
+    scaled = Scaled.of(normal_equations(blocks), ridge, free)
+    if scaled.harmless:
+        return scaled.solution("normal equations")
+    triangle: FloatArray | None = None
+    for V, Y in blocks():
+        rows = np.hstack([V / scaled.scale, Y])
+        triangle = add_rows(rows[:0] if triangle is None else triangle, rows)
+    assert triangle is not None, "the same blocks as before"
+    return scaled.by_triangle(triangle)
 
 
-def cholesky(blocks: RowBlocks) -> Solution:
+def cholesky(normal: Normal) -> Solution:
     """The same minimum from the normal equations as they stand, which squares the condition of columns as they are.
 
     What a textbook writes and many programs do; it is here to show where it ends. Raises ``InvalidValueError`` when
@@ -76,7 +132,6 @@ def cholesky(blocks: RowBlocks) -> Solution:
     """
     from scipy.linalg import solve_triangular  # noqa: PLC0415  (other fits go without)
 
-    normal = _normal_equations(blocks)
     try:
         L = np.linalg.cholesky(normal.gram)
     except np.linalg.LinAlgError as error:
@@ -85,10 +140,11 @@ def cholesky(blocks: RowBlocks) -> Solution:
             "positive definite any more): lower fit-edmd.order, or use the solver 'orthonormal'"
         ) from error
     W = solve_triangular(L.T, solve_triangular(L, normal.cross, lower=True))
-    return Solution(np.asarray(W), np.asarray(np.linalg.svd(L, compute_uv=False)), len(L))
+    return Solution(np.asarray(W), np.asarray(np.linalg.svd(L, compute_uv=False)), len(L), "Cholesky")
 
 
-def _normal_equations(blocks: RowBlocks) -> _Normal:
+def normal_equations(blocks: RowBlocks) -> Normal:
+    """Both sums over the blocks (V_i, Y_i). Raises ``InvalidValueError`` where there are none or some not finite."""
     gram = cross = None
     rows = 0
     for V, Y in blocks():
@@ -98,24 +154,9 @@ def _normal_equations(blocks: RowBlocks) -> _Normal:
         rows += len(V)
     if gram is None or cross is None:
         raise InvalidValueError("there are no samples to fit")
-    if not (np.isfinite(gram).all() and np.isfinite(cross).all()):
-        raise InvalidValueError("the training data hold values that are not finite: simulate a tamer sample")
-    return _Normal(gram, cross, rows)
+    return Normal(gram, cross, rows)
 
 
-def _by_qr(blocks: RowBlocks, scale: FloatArray, rows: int, penalty: FloatArray) -> Solution:
-    """The same minimum from the triangular factor of [V Y], kept while the blocks pass by."""
-    columns = len(scale)
-    triangle: FloatArray | None = None
-    for V, Y in blocks():
-        stacked = np.hstack([V / scale, Y])
-        if triangle is None:
-            punished = np.diag(np.sqrt(penalty))[penalty > 0]
-            triangle = np.hstack([punished, np.zeros((len(punished), Y.shape[1]))])
-        triangle = np.asarray(np.linalg.qr(np.vstack([triangle, stacked]), mode="r"))
-    assert triangle is not None
-    R, S = triangle[:columns, :columns], triangle[:columns, columns:]
-    U, singular, Vt = np.linalg.svd(R, full_matrices=False)
-    keep = singular > singular[0] * np.finfo(float).eps * max(rows, columns)
-    W = Vt[keep].T @ ((U[:, keep].T @ S) / singular[keep][:, np.newaxis])
-    return Solution(W / scale[:, np.newaxis], singular, int(keep.sum()))
+def add_rows(triangle: FloatArray, *rows: FloatArray) -> FloatArray:
+    """The R of a QR factorisation with more ``rows`` below ``triangle``."""
+    return np.asarray(np.linalg.qr(np.vstack([triangle, *rows]), mode="r"))

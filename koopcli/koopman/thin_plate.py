@@ -58,6 +58,7 @@ class ThinPlate:
     centres: FloatArray
 
     constant: ClassVar[int] = 0
+    products: ClassVar[None] = None
 
     @property
     def functions(self) -> int:
@@ -76,6 +77,10 @@ class ThinPlate:
         """ψ(x) (n, N) of the states (n, n_x)."""
         scaled = (x - self.middle) / self.scale
         return np.hstack([np.ones((len(x), 1)), scaled, thin_plate(x, self.centres, self.scale)])
+
+    def lift_rows(self, x: FloatArray, out: FloatArray) -> None:
+        """ψ(x) of the states (n, n_x) as rows into ``out`` (N, n)."""
+        out[:] = self.lift(x).T
 
     def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
         """rows · ψ(x) as (n, R), for ``rows`` (R, N)."""

@@ -43,8 +43,12 @@ class Reporter(Protocol):
 class Chunks(Protocol):
     """Work in chunks, each committed as it is done; those already there are not computed again."""
 
-    def __call__(self, count: int, size: int) -> list[Packed]:
-        """The results of the stage's ``chunk`` on consecutive slices of ``range(count)`` of length ``size``."""
+    def __call__(self, count: int, size: int, given: Packed | None = None) -> list[Packed]:
+        """The results of the stage's ``chunk`` on consecutive slices of ``range(count)`` of length ``size``.
+
+        A stage may ask several times, each time with something else that is ``given``: its chunks find it among their
+        inputs as "given".
+        """
 
 
 @dataclass(frozen=True)

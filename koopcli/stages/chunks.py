@@ -25,7 +25,8 @@ FINE = 1000  # parts of a chunk that progress is told in
 @dataclass(frozen=True)
 class Chunk:
     """One chunk of one artefact. It names its inputs, by role, so that another process finds them in the store; where
-    it runs in the process that has them it holds them, as ``at_hand``. ``start`` to ``stop`` are its rows.
+    it runs in the process that has them it holds them, as ``at_hand``. ``start`` to ``stop`` are its rows; ``given``
+    is the number of the part that holds what else it works with.
     """
 
     root: Path
@@ -36,6 +37,7 @@ class Chunk:
     i: int = 0
     start: int = 0
     stop: int = 0
+    given: int | None = None
     at_hand: Inputs | None = None
     progress: Progress = silent
 
@@ -44,6 +46,11 @@ class Chunk:
         inputs = self.at_hand
         if inputs is None:
             inputs = {role: _content(self.root, name) for role, name in self.inputs}
+            if self.given is not None:
+                there = _store(self.root).parts(self.key).read([self.given])
+                if self.given not in there:
+                    raise _GoneError
+                inputs |= {"given": there[self.given]}
         chunk = STAGES[self.stage].chunk
         assert chunk is not None, "only a stage with chunks asks for them"
         return chunk(self.settings, inputs, slice(self.start, self.stop), self.progress)
@@ -59,7 +66,7 @@ def commit(chunk: Chunk) -> list[str]:
     return warned
 
 
-@dataclass(frozen=True)
+@dataclass
 class ChunkedWork:
     """What a stage calls for its chunks; see :class:`koopcli.stages.base.Chunks`."""
 
@@ -71,15 +78,26 @@ class ChunkedWork:
     note: Callable[[str], None]
     size: float = 0.0
     """About how many bytes the whole will have."""
+    begun: int = 0
+    """How many parts earlier calls have numbered."""
 
-    def __call__(self, count: int, size: int) -> list[Packed]:
+    def __call__(self, count: int, size: int, given: Packed | None = None) -> list[Packed]:
         """The packed results of all slices of ``range(count)``, in order; large ones stay on disk."""
-        chunks = [self._chunk(i, rows, count) for i, rows in enumerate(blocks(slice(0, count), size))]
+        whole, first = self.whole, self.begun
+        if given is not None:
+            assert whole.at_hand is not None, "here are the inputs"
+            whole = replace(whole, given=first, at_hand={**whole.at_hand, "given": given})
+            first += 1
+        every = list(enumerate(blocks(slice(0, count), size), first))
+        chunks = [self._chunk(whole, i, rows, count) for i, rows in every]
+        self.begun = first + len(chunks)
         if len(chunks) == 1:
             return [chunks[0].compute()]
-        parts = self.store.parts(self.whole.key)
+        parts = self.store.parts(whole.key)
         self.store.require(2 * self.size - parts.size())  # the chunks, then the whole beside them
-        found = parts.read(range(len(chunks)))
+        if given is not None and not parts.read([first - 1]):
+            parts.commit(first - 1, given)
+        found = parts.read([chunk.i for chunk in chunks])
         missing = [chunk for chunk in chunks if chunk.i not in found]
         if len(missing) < len(chunks):
             self.note(f"{len(chunks) - len(missing)} of {len(chunks)} chunks were already there")
@@ -96,12 +114,12 @@ class ChunkedWork:
         # Others may have cleared chunks where no lock keeps them away, or have removed the inputs of a worker.
         return [found[chunk.i] if chunk.i in found else chunk.compute() for chunk in chunks]
 
-    def _chunk(self, i: int, rows: slice, count: int) -> Chunk:
+    def _chunk(self, whole: Chunk, i: int, rows: slice, count: int) -> Chunk:
         def inside(done: int, total: int) -> None:
             length = rows.stop - rows.start
             self.progress(FINE * rows.start + FINE * length * done // max(1, total), FINE * count)
 
-        return replace(self.whole, i=i, start=rows.start, stop=rows.stop, progress=inside)
+        return replace(whole, i=i, start=rows.start, stop=rows.stop, progress=inside)
 
 
 class _GoneError(Exception):
@@ -114,7 +132,7 @@ def _store(root: Path) -> Store:
     return Store(root)
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=4)
 def _content(root: Path, name: str) -> Any:
     """The verified content of an input, kept from one chunk to the next."""
     store = _store(root)

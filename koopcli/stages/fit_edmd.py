@@ -2,35 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import fields
+
 from koopcli.checks import build
 from koopcli.config.samples import GridSample
-from koopcli.config.settings import OF_BASIS, FitEdmd
+from koopcli.config.settings import OF_BASIS, FitEdmd, Simulate
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import edmd
 from koopcli.koopman.bases import BASES, Basis, Choice
+from koopcli.koopman.blockwise import PASSES
+from koopcli.koopman.coverage import coverage_of
+from koopcli.koopman.passes import Found, Pass, pack_found, unpack_found
 from koopcli.koopman.polynomial import FAMILIES
 from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.survey import Survey, survey
 from koopcli.koopman.thin_plate import ThinPlate
-from koopcli.records import Trajectories
+from koopcli.koopman.transitions import Transitions
+from koopcli.progress import Progress
+from koopcli.records import Packed
 from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task
 from koopcli.stages.predictors import describe, figures
-from koopcli.stages.usable import finished
+from koopcli.stages.usable import finished, roles_of
 from koopcli.store.files import size_text
 from koopcli.vehicles.plants import PLANTS
 
 TERMS_LIMIT = 4096  # coefficients of one lifted state
 HARMLESS = 1e14  # a condition number that leaves two digits
+OF_ONE_RUN = ("steps", "chunk", "reference")  # settings of a simulation that make it no other plant
 
 
 def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
-    trajectories = finished(inputs["trajectories"], context)
+    data = Transitions.of([finished(inputs[role], context) for role in roles_of(inputs)])
+
+    def over(work: Pass) -> Iterator[Found]:
+        yield from map(unpack_found, context.chunks(len(data), settings.chunk, work.pack()))
+
     plain = settings.solver == "cholesky-monomials"
-    basis = edmd.basis_from_data(trajectories, _choice(settings))
-    _warn_of_centres(basis, trajectories, context)
+    seen = survey(data, over)
+    basis = edmd.basis_from_data(data, _choice(settings), seen)
+    _warn_of_centres(basis, seen, context)
     method = edmd.Method(settings.terms != "linear", settings.ridge, plain, settings.terms == "generator")
-    predictor = edmd.fit(trajectories, basis, method, context.progress)
+    predictor = edmd.fit(data, basis, method, context.progress, over, seen)
     if predictor.rank < predictor.directions:
-        because = edmd.why_deficient(trajectories, predictor)
+        because = edmd.why_deficient(data, predictor, seen)
         context.warn(
             f"the data determine {predictor.rank} of {predictor.directions} directions (condition "
             f"{predictor.condition:.1e}){f' because {because}' if because else ''}; the others were set to zero: "
@@ -54,9 +69,16 @@ def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
     return predictor
 
 
-def _warn_of_centres(basis: Basis, trajectories: Trajectories, context: Context) -> None:
+def _chunk(settings: FitEdmd, inputs: Inputs, rows: slice, progress: Progress) -> Packed:
+    """What the pass that is given finds in some of the samples."""
+    given: Packed = inputs["given"]
+    data = Transitions.of([inputs[role].finished() for role in roles_of(inputs)])
+    return pack_found(PASSES[given.meta["kind"]](given)(data, rows, progress))
+
+
+def _warn_of_centres(basis: Basis, seen: Survey, context: Context) -> None:
     if isinstance(basis, ThinPlate):
-        outside = int(edmd.coverage(trajectories).outside(basis.centres).sum())
+        outside = int(coverage_of(seen.states, seen.corners).outside(basis.centres).sum())
         if outside:
             context.warn(
                 f"{outside} of {len(basis.centres)} centres lie outside the data, where splines only grow: "
@@ -135,9 +157,26 @@ def _check(task: Task) -> None:
             )
     if settings.terms == "generator" and settings.basis == "states":
         raise InvalidValueError("the terms 'generator' need a constant, which the basis 'states' has not: use 'total'")
+    data = [task.input(role) for role in roles_of(dict(task.inputs))]
+    _check_alike(data)
     sample = task.find("sample")
-    if sample is not None and isinstance(sample.settings, GridSample):
+    if sample is not None and isinstance(sample.settings, GridSample) and len(data) == 1:
         _check_grid(task, sample.settings)
+
+
+def _check_alike(data: list[Task]) -> None:
+    """Refuse several trajectories that are not of one plant and period, or one of them twice."""
+    names = [f.name for f in fields(Simulate) if f.name not in OF_ONE_RUN]
+    for other in data[1:]:
+        differing = [name for name in names if getattr(data[0].settings, name) != getattr(other.settings, name)]
+        if differing:
+            raise InvalidValueError(
+                f"{data[0].name} and {other.name} differ in {', '.join(differing)}: one predictor is of one plant, "
+                "vehicle and sampling period, so fit them apart"
+            )
+    for i, one in enumerate(data):
+        if one in data[:i]:
+            raise InvalidValueError(f"{one.name} is named twice: its samples would count double, so name it once")
 
 
 def _check_grid(task: Task, grid: GridSample) -> None:
@@ -159,9 +198,10 @@ def _check_grid(task: Task, grid: GridSample) -> None:
 
 def _estimate(task: Task) -> Cost:
     N, terms = _functions(task), _terms(task)
-    sample, plant = task.ancestor("sample").settings, task.ancestor("simulate").settings
-    samples = sample.trajectories * plant.steps
-    crossed = isinstance(sample, GridSample) and plant.steps == 1 and task.settings.solver == "orthonormal"
+    data = [task.input(role) for role in roles_of(dict(task.inputs))]
+    samples = sum(one.ancestor("sample").settings.trajectories * one.settings.steps for one in data)
+    sample, steps = data[0].ancestor("sample").settings, data[0].settings.steps
+    crossed = isinstance(sample, GridSample) and steps == 1 and task.settings.solver == "orthonormal" and len(data) == 1
     rows = samples // (len(sample.levels) * sample.columns) if crossed else 2 * samples
     lifting = (1e-8 * task.settings.centres if task.settings.basis == "thin-plate" else 1e-6) * samples
     return Cost(lifting + 5e-11 * rows * N * terms + 1.5e-9 * N**3, 8.0 * N * terms)
@@ -169,7 +209,7 @@ def _estimate(task: Task) -> Cost:
 
 STAGE = Stage(
     name="fit-edmd",
-    version=3,
+    version=4,
     settings=lambda values: build(FitEdmd, values),
     run=_run,
     unpack=Predictor.unpack,
@@ -177,5 +217,6 @@ STAGE = Stage(
     describe=describe,
     check=_check,
     estimate=_estimate,
+    chunk=_chunk,
     predicts=_prospect,
 )

@@ -15,12 +15,14 @@ def figures(predictor: Predictor) -> Meta:
         "condition": predictor.condition,
         "spectral_radius": predictor.spectral_radius,
         "horizon": predictor.horizon,
+        "solved_by": predictor.solved_by,
     }
 
 
 def describe(figures: Meta) -> str:
     """The same in a few words."""
+    way = f", {figures['solved_by']}" if figures["solved_by"] else ""
     return (
         f"{figures['functions']} functions, rank {figures['rank']} of {figures['directions']}, "
-        f"condition {figures['condition']:.2g}, spectral radius {figures['spectral_radius']:.6f}"
+        f"condition {figures['condition']:.2g}, spectral radius {figures['spectral_radius']:.6f}{way}"
     )

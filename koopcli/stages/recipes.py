@@ -17,6 +17,7 @@ from koopcli.errors import InvalidValueError
 from koopcli.records import Meta
 from koopcli.stages.base import Task
 from koopcli.stages.makers import MAKERS
+from koopcli.stages.usable import as_inputs
 from koopcli.vehicles.handling import tyres_of, wheel_loads
 from koopcli.vehicles.parameters import TYRES
 
@@ -42,10 +43,10 @@ def simulation(experiment: Experiment, of: Task | None = None, plant: str = "for
     return Task("simulate", settings.settled(), (("sample", start),))
 
 
-def fit_edmd(experiment: Experiment, of: Task | None = None) -> Task:
+def fit_edmd(experiment: Experiment, *of: Task) -> Task:
     """The EDMD predictor, from the experiment's training set or the trajectories given."""
-    trajectories = of or simulation(experiment, plant="forces")
-    return Task("fit-edmd", experiment.fit_edmd.settled(), (("trajectories", trajectories),))
+    trajectories = of or (simulation(experiment, plant="forces"),)
+    return Task("fit-edmd", experiment.fit_edmd.settled(), as_inputs(trajectories))
 
 
 def fit_eigen(experiment: Experiment, of: Task | None = None) -> Task:

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from typing import TypeVar
+
 from koopcli.records import Trajectories
 from koopcli.stages.base import Context
+
+T = TypeVar("T")
+ROLE = "trajectories"
 
 
 def finished(trajectories: Trajectories, context: Context) -> Trajectories:
@@ -13,3 +19,14 @@ def finished(trajectories: Trajectories, context: Context) -> Trajectories:
         left = len(trajectories) - len(found)
         context.warn(f"{left} of {len(trajectories)} trajectories ended early and are left out")
     return found
+
+
+def as_inputs(trajectories: Sequence[T]) -> tuple[tuple[str, T], ...]:
+    """One or several trajectories as inputs by role: "trajectories", "2/trajectories", …"""
+    return tuple((ROLE if i == 1 else f"{i}/{ROLE}", one) for i, one in enumerate(trajectories, 1))
+
+
+def roles_of(inputs: Iterable[str]) -> list[str]:
+    """The roles of trajectories among ``inputs``, in their order."""
+    found = [role for role in inputs if role.rpartition("/")[2] == ROLE]
+    return sorted(found, key=lambda role: int(role.partition("/")[0]) if role != ROLE else 1)

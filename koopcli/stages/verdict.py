@@ -11,6 +11,7 @@ from koopcli.config.settings import Baseline, FitEdmd
 from koopcli.records import Meta
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
+from koopcli.stages.usable import roles_of
 
 LINEAR = FitEdmd(basis="total", order=1)
 NAMES = {
@@ -23,13 +24,14 @@ NAMES = {
 def beside(experiment: Experiment, evaluation: Task) -> dict[str, Task]:
     """Evaluations of what a predictor has to beat, on the same test set; none where its training data are gone."""
     predictor = evaluation.input("predictor")
-    training = dict(predictor.inputs).get("trajectories")
-    if training is None:
+    inputs = dict(predictor.inputs)
+    data = [inputs[role] for role in roles_of(inputs)]
+    if not data:
         return {}
     others = {
-        "hold": recipes.baseline(replace(experiment, baseline=Baseline("hold")), training),
-        "linearisation": recipes.baseline(replace(experiment, baseline=Baseline("linearisation")), training),
-        "linear": recipes.fit_edmd(replace(experiment, fit_edmd=LINEAR), training),
+        "hold": recipes.baseline(replace(experiment, baseline=Baseline("hold")), data[0]),
+        "linearisation": recipes.baseline(replace(experiment, baseline=Baseline("linearisation")), data[0]),
+        "linear": recipes.fit_edmd(replace(experiment, fit_edmd=LINEAR), *data),
     }
     trajectories = evaluation.input("trajectories")
     return {

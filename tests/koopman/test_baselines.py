@@ -14,7 +14,7 @@ from tests.conftest import ball_of, box_sample, trajectories_of
 def forecast(kind, plant, name="slips"):
     about = {"plant": name, "force_per": "axle", "v_eps": 0.1, "vehicle": asdict(plant.parameters)}
     states = np.random.default_rng(0).uniform(-1, 1, (20, 3))
-    coverage = coverage_of(lambda: [states], len(states))
+    coverage = coverage_of(states)
     return Forecast(kind, 0.01, coverage, plant.states, plant.inputs, about)
 
 

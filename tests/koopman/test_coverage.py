@@ -3,8 +3,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from koopcli.koopman.coverage import Coverage, coverage_of
+from koopcli.koopman.coverage import Coverage, corners_of, coverage_of
 from koopcli.koopman.metrics import overlap_of_largest
+
+
+def merged(*parts):
+    """The corners of states that come part by part."""
+    corners = corners_of(parts[0])
+    for part in parts[1:]:
+        corners = corners_of(np.concatenate([corners, part]))
+    return corners
 
 
 @pytest.fixture
@@ -19,14 +27,14 @@ def test_distances_in_half_widths_of_the_data(cloud):
     x = np.random.default_rng(1).uniform(-40, 40, (50, 3))
     half = (domain[1] - domain[0]) / 2
     brute = np.sqrt((((x[:, None] - states) / half) ** 2).sum(axis=2)).min(axis=1)
-    coverage = coverage_of(lambda: [states], len(states))
+    coverage = coverage_of(states)
     assert coverage.distance(x) == pytest.approx(brute, rel=1e-9)
     assert coverage.distance(states) == pytest.approx(np.zeros(500), abs=1e-12)
 
 
 def test_inside_and_outside_the_hull(cloud):
     states, domain = cloud
-    coverage = coverage_of(lambda: [states], len(states))
+    coverage = coverage_of(states)
     assert not coverage.outside(states).any()
     centre = states.mean(axis=0)
     mixtures = np.random.default_rng(2).dirichlet(np.ones(500), 100) @ states
@@ -48,7 +56,7 @@ def test_a_grid_is_its_box():
     x = np.random.default_rng(6).uniform(-6, 6, (500, 3))
     expected = ((x < grid.min(axis=0)) | (x > grid.max(axis=0))).any(axis=1)
     for states in (grid, grid[:-1]):  # without a corner it is a hull like any other
-        coverage = coverage_of(lambda states=states: [states], len(states))
+        coverage = coverage_of(states)
         assert (coverage.outside(x) == expected).all() == (len(states) == len(grid))
 
 
@@ -59,17 +67,17 @@ def test_a_large_grid_and_a_flat_block_keep_their_corners(limit, monkeypatch):
     monkeypatch.setattr(module, "STATES_LIMIT", limit)
     values = np.linspace(-1, 1, 12)
     grid = np.stack(np.meshgrid(values, values, values), axis=-1).reshape(-1, 3)
-    coverage = coverage_of(lambda: [grid], len(grid))
+    coverage = coverage_of(grid)
     assert not coverage.outside(0.99 * grid).any()
     assert coverage.outside(1.01 * grid[np.abs(grid).max(axis=1) == 1]).all()
     flat = grid[grid[:, 2] == -1]
-    both = coverage_of(lambda: [flat, grid[::7], grid[::5]], len(flat) + len(grid[::7]) + len(grid[::5]))
+    both = coverage_of(grid, merged(flat, grid[::7], grid[::5]))
     assert not both.outside(flat).any()
 
 
 def test_states_in_a_plane_fall_back_to_their_box():
     states = np.random.default_rng(3).uniform(-1, 1, (30, 3)) * [1, 1, 0]
-    coverage = coverage_of(lambda: [states], len(states))
+    coverage = coverage_of(states)
     assert not coverage.outside(states).any()
     assert coverage.outside(np.array([[2.0, 0, 0], [0, 0, 3.0]])).all()
     assert np.isfinite(coverage.distance(np.array([[0.0, 0, 3.0]]))).all()
@@ -80,9 +88,9 @@ def test_blocks_and_thinning_change_no_hull(cloud, monkeypatch):
     from koopcli.koopman import coverage as module
 
     states, _ = cloud
-    whole = coverage_of(lambda: [states], 500)
+    whole = coverage_of(states)
     monkeypatch.setattr(module, "STATES_LIMIT", 100)
-    thinned = coverage_of(lambda: (states[i : i + 7] for i in range(0, 500, 7)), 500)
+    thinned = coverage_of(states, merged(*(states[i : i + 7] for i in range(0, 500, 7))))
     assert len(thinned.states) <= 100
     assert (thinned.domain == whole.domain).all()
     x = np.random.default_rng(5).uniform(-40, 40, (400, 3))
@@ -91,7 +99,7 @@ def test_blocks_and_thinning_change_no_hull(cloud, monkeypatch):
 
 
 def test_it_survives_storage(cloud):
-    coverage = coverage_of(lambda: [cloud[0]], 500)
+    coverage = coverage_of(cloud[0])
     again = Coverage.unpack(coverage.pack("m/s, m/s, rad/s"))
     x = np.random.default_rng(4).uniform(-40, 40, (50, 3))
     assert (again.distance(x) == coverage.distance(x)).all()

@@ -10,10 +10,11 @@ import pytest
 from scipy.linalg import expm
 
 from koopcli.errors import InvalidValueError
-from koopcli.koopman import edmd
+from koopcli.koopman import edmd, sums, survey
 from koopcli.koopman.bases import Choice
 from koopcli.koopman.evaluation import evaluate
 from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.transitions import Transitions
 from koopcli.records import Array, Channels, Packed, Trajectories
 from tests.conftest import box_sample, grid_sample, trajectories_of
 
@@ -26,6 +27,8 @@ class Monomials:
     """A basis given by exponents, for systems whose Koopman operator is known."""
 
     exponents: tuple[tuple[int, ...], ...]
+
+    products = None
 
     @property
     def functions(self):
@@ -43,6 +46,9 @@ class Monomials:
 
     def lift(self, x):
         return np.stack([np.prod(x ** np.array(e), axis=1) for e in self.exponents], axis=1)
+
+    def lift_rows(self, x, out):
+        out[:] = self.lift(x).T
 
     def observe(self, x, rows):
         return self.lift(x) @ rows.T
@@ -106,7 +112,7 @@ def test_the_slow_manifold_gives_its_three_eigenvalues():
 def test_no_pair_spans_two_trajectories():
     rng = np.random.default_rng(10)
     data = synthetic(lambda x, u: 0.5 * x + u, rng.standard_normal((30, 1)), rng.standard_normal((30, 4, 1)))
-    pairs = list(data.transitions(8))
+    pairs = list(Transitions.of(data).blocks(8))
     assert sum(len(x) for x, _, _ in pairs) == 120
     for x, u, x_next in pairs:
         assert x_next == pytest.approx(0.5 * x + u, abs=1e-14)
@@ -137,7 +143,7 @@ def test_the_size_of_a_block_does_not_matter(reduced, monkeypatch):
     general = replace(reduced, product=None)
     basis = edmd.basis_from_data(general, Choice("tensor", 3))
     large = edmd.fit(general, basis)
-    monkeypatch.setattr(edmd, "BLOCK", 100)
+    monkeypatch.setattr(sums, "READ", 100)
     small = edmd.fit(general, basis)
     assert pytest.approx(large.A, rel=1e-10, abs=1e-12) == small.A
     assert pytest.approx(large.A, rel=1e-9, abs=1e-12) == edmd.fit(reduced, basis).A
@@ -149,7 +155,7 @@ def test_a_raw_monomial_fit_predicts_the_same(plant):
     predictor = edmd.fit(data, edmd.basis_from_data(data, Choice("tensor", 4)))
     raw = Monomials(tuple((a, b, c) for a in range(5) for b in range(5) for c in range(5)))
     gram, cross = np.zeros((129, 129)), np.zeros((129, 125))
-    for x, u, x_next in data.transitions(4096):
+    for x, u, x_next in Transitions.of(data).blocks(4096):
         V = np.hstack([raw.lift(x), u])
         gram += V.T @ V
         cross += V.T @ raw.lift(x_next)
@@ -321,7 +327,7 @@ def test_a_ridge_is_the_least_squares_of_rows_added(reduced):
     general, ridge = replace(reduced, product=None), 0.05
     basis = edmd.basis_from_data(general, Choice("total", 2))
     predictor = edmd.fit(general, basis, edmd.Method(ridge=ridge))
-    x, u, x_next = (np.concatenate(found) for found in zip(*general.transitions(4096), strict=True))
+    x, u, x_next = (np.concatenate(found) for found in zip(*Transitions.of(general).blocks(4096), strict=True))
     V = np.hstack([basis.lift(x), u - u.mean(axis=0)])
     scale = np.linalg.norm(V, axis=0)
     rows = np.sqrt(ridge) * np.eye(V.shape[1])[1:10]  # function 0 and the four inputs are free
@@ -380,17 +386,17 @@ def test_what_leaves_a_fit_open_is_named(reduced):
 def test_a_basis_from_many_rows_uses_a_spread_choice(monkeypatch, reduced):
     """Regular data must not be subsampled in step with their own period."""
     general = replace(reduced, product=None)
-    monkeypatch.setattr(edmd, "MARGINAL_ROWS", 2000)
+    monkeypatch.setattr(survey, "MARGINAL_ROWS", 2000)
     basis = edmd.basis_from_data(general, Choice("tensor", 8))  # all nine values of each state are found
     assert basis.functions == 9**3
-    monkeypatch.setattr(edmd, "MARGINAL_ROWS", 10)
+    monkeypatch.setattr(survey, "MARGINAL_ROWS", 10)
     assert edmd.basis_from_data(reduced, Choice("tensor", 8)).functions == 9**3
 
 
 def test_long_trajectories_are_read_in_pieces(reduced):
     rng = np.random.default_rng(14)
     data = synthetic(lambda x, u: 0.9 * x + u, rng.standard_normal((2, 1)), rng.standard_normal((2, 1000, 1)))
-    sizes = [len(x) for x, _, _ in data.transitions(64)]
+    sizes = [len(x) for x, _, _ in Transitions.of(data).blocks(64)]
     assert max(sizes) == 64
     assert sum(sizes) == 2000
 

@@ -218,9 +218,10 @@ def figure_records(name: str) -> dict:
 
 
 def _chunks(stage, settings, inputs):
-    def chunks(count, size):
+    def chunks(count, size, given=None):
         rows = (slice(start, min(start + size, count)) for start in range(0, count, size))
-        return [STAGES[stage].chunk(settings, inputs, one, silent) for one in rows]
+        there = inputs if given is None else {**inputs, "given": given}
+        return [STAGES[stage].chunk(settings, there, one, silent) for one in rows]
 
     return chunks
 
