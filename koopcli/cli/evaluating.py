@@ -11,6 +11,7 @@ import typer
 from koopcli.cli import fitting
 from koopcli.cli.invocation import Invocation, begin
 from koopcli.cli.options import (
+    ClusterOption,
     DryRunOption,
     ExperimentOption,
     JsonOption,
@@ -75,6 +76,7 @@ def evaluate(
         ),
     ] = None,
     workers: WorkersOption = 1,
+    cluster: ClusterOption = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
@@ -92,7 +94,7 @@ def evaluate(
     """
     given: Values = {"excitation": excitation, "amplitude": amplitude, "count": count, "steps": steps, "seed": seed}
     changes: Changes = {"test": given, "evaluate": {"restart": restart}}
-    call = begin(store, experiment, set_, (*fitting.DATA, "fit-edmd", *TEST), changes, workers)
+    call = begin(store, experiment, set_, (*fitting.DATA, "fit-edmd", *TEST), changes, workers, cluster)
     from koopcli.stages import recipes
     from koopcli.stages.verdict import beside
 

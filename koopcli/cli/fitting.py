@@ -8,12 +8,14 @@ import typer
 
 from koopcli.cli.invocation import begin
 from koopcli.cli.options import (
+    ClusterOption,
     DryRunOption,
     ExperimentOption,
     JsonOption,
     SetOption,
     StoreOption,
     VehicleOption,
+    WorkersOption,
     complete_name,
     names,
 )
@@ -92,6 +94,8 @@ def fit_edmd(
             f"instead, to show where their digits end ({FitEdmd.solver}).",
         ),
     ] = None,
+    workers: WorkersOption = 1,
+    cluster: ClusterOption = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
@@ -103,6 +107,9 @@ def fit_edmd(
     With --terms bilinear it is z⁺ = A z + B u + Σ u_i N_i z: the products of an input with powers of the yaw rate,
     which no constant B can hold. The basis anisotropic has the powers it needs with few functions. With --terms
     generator the same data give ż = (K_0 + Σ u_i K_i) z, whose step also has what is quadratic in large inputs.
+
+    Data of any size are read in blocks; what is summed over them is committed part by part, shared by --workers or a
+    --cluster, and gone on with after an interruption.
 
     Example: koop fit-edmd --basis anisotropic --order 8 --terms bilinear
     """
@@ -117,7 +124,7 @@ def fit_edmd(
         "solver": solver,
     }
     given: Changes = {"fit-edmd": fit, "vehicle": {"name": vehicle}}
-    call = begin(store, experiment, set_, (*DATA, "fit-edmd"), given)
+    call = begin(store, experiment, set_, (*DATA, "fit-edmd"), given, workers, cluster)
     from koopcli.stages import recipes
 
     of = [call.named(name, ["simulate"], "the TRAJECTORIES", ("fit-edmd",)) for name in trajectories or []]

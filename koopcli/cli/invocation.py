@@ -100,16 +100,17 @@ def begin(
     sections: Sequence[str],
     options: Changes | None = None,
     workers: int = 1,
+    cluster: str | None = None,
 ) -> Invocation:
     """What a command works with; its ``options`` win over ``--set``, which wins over the experiment file.
 
     ``sections``: those whose settings the command uses; ``--set`` of any other is refused. ``workers``: how many
-    processes share the work.
+    processes share the work, or those of a Dask ``cluster`` by its address.
     """
     from koopcli.stages.pipeline import Pipeline
     from koopcli.stages.workers import Workers
 
-    sharing = Workers(workers)
+    sharing = Workers(workers, cluster)
     changes = parse_set(assignments or [])
     for section, values in (options or {}).items():
         changes.setdefault(section, {}).update({key: v for key, v in values.items() if v is not None})

@@ -11,6 +11,7 @@ import typer
 from koopcli.cli import evaluating, fitting
 from koopcli.cli.invocation import Invocation, begin
 from koopcli.cli.options import (
+    ClusterOption,
     DryRunOption,
     ExperimentOption,
     JsonOption,
@@ -201,6 +202,7 @@ def simulate(
         ),
     ] = None,
     workers: WorkersOption = 1,
+    cluster: ClusterOption = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
@@ -222,7 +224,7 @@ def simulate(
         "combined": combined,
         "reference": reference,
     }
-    call = begin(store, experiment, set_, SIMULATE, {"simulate": given, "vehicle": {"name": vehicle}}, workers)
+    call = begin(store, experiment, set_, SIMULATE, {"simulate": given, "vehicle": {"name": vehicle}}, workers, cluster)
     from koopcli.stages import recipes
 
     of = call.named(sample, ["sample"], "the SAMPLE", ("simulate", "vehicle")) if sample else None

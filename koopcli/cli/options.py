@@ -44,6 +44,15 @@ WorkersOption = Annotated[
     int,
     typer.Option("--workers", metavar="N", help="Processes that share the work; they do not change a result."),
 ]
+ClusterOption = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="ADDRESS",
+        help="Share the work on a Dask cluster instead: the address of its scheduler, or the .json file it wrote. Needs "
+        "the extra koopcli[dask], and a store that all workers see.",
+    ),
+]
 ExperimentOption = Annotated[
     str,
     typer.Option("--experiment", metavar="NAME|FILE", help="Where settings come from: paper, smoke or a TOML file."),

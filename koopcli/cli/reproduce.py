@@ -13,7 +13,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from koopcli.cli.invocation import Invocation, begin, print_json, show_plan
-from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption, WorkersOption
+from koopcli.cli.options import (
+    ClusterOption,
+    DryRunOption,
+    ExperimentOption,
+    JsonOption,
+    SetOption,
+    StoreOption,
+    WorkersOption,
+)
 from koopcli.config.changes import SECTIONS, flat, nested
 from koopcli.config.experiment import load_experiment
 from koopcli.console import show_table
@@ -59,6 +67,7 @@ def reproduce(
         ),
     ] = False,
     workers: WorkersOption = 1,
+    cluster: ClusterOption = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
     store: StoreOption = None,
@@ -78,7 +87,7 @@ def reproduce(
     if smoke and experiment != "paper":
         raise UsageError("--smoke is an experiment of its own: leave out --experiment")
     base = "smoke" if smoke else experiment
-    call = begin(store, base, set_, SECTIONS, {"reproduce": {"full": True if full else None}}, workers)
+    call = begin(store, base, set_, SECTIONS, {"reproduce": {"full": True if full else None}}, workers, cluster)
     from koopcli.reproduction import report
     from koopcli.reproduction.illustrations import illustrate
     from koopcli.reproduction.registry import BEYOND, METHODS

@@ -5,6 +5,7 @@ What comes after finds everything in the store. A task that cannot be made is le
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
@@ -15,8 +16,10 @@ from koopcli.errors import KoopError, StorageError
 from koopcli.progress import Progress, silent
 from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline
-from koopcli.stages.workers import WorkerDiedError, done, result
+from koopcli.stages.workers import WorkerDiedError, done
 from koopcli.store import Store
+
+FATAL = (StorageError, WorkerDiedError)  # the next task would fare no better
 
 
 @dataclass(frozen=True)
@@ -43,44 +46,57 @@ def make(making: Making) -> Made:
     return Made(pipeline.said, heard.warned)
 
 
-def make_ahead(pipeline: Pipeline, tasks: Iterable[Task]) -> None:
-    """Make what is missing of ``tasks`` and behind them, if there are workers to share it; say how much was there."""
+def make_ahead(pipeline: Pipeline, tasks: Iterable[Task]) -> dict[Task, KoopError]:
+    """Make what is missing of ``tasks`` and behind them, if there are workers to share it; say how much was there.
+
+    Returns those that could not be made, and why.
+    """
     wanted = list(dict.fromkeys(step for task in tasks for step in task.upstream()))
     missing = [task for task in wanted if pipeline.found(task) is None]
     if 0 < len(missing) < len(wanted):
         pipeline.reporter.note(f"{len(wanted) - len(missing)} of {len(wanted)} artefacts were already there")
-    if pipeline.workers.count == 1:
-        return
+    failed: dict[Task, KoopError] = {}
+    if pipeline.workers.alone or not missing:
+        return failed
+    pipeline.workers.begin(pipeline.store.folder())
     with pipeline.reporter.progress("making") as progress:
-        for count, made in enumerate(_each(pipeline, missing), 1):
+        for count, made in enumerate(_each(pipeline, missing, failed), 1):
             progress(count, len(missing))
             for text in made.warned:
                 pipeline.reporter.warn(text)
             for name, what in made.said.items():
                 pipeline.announce(name, what)
+    return failed
 
 
-def _each(pipeline: Pipeline, missing: list[Task]) -> Iterator[Made]:
-    """Make ``missing``, each as soon as its inputs are there; what depends on one that fails is not begun."""
-    lacking = {task: {one for _, one in task.inputs} & set(missing) for task in missing}
+def _each(pipeline: Pipeline, missing: list[Task], failed: dict[Task, KoopError]) -> Iterator[Made]:
+    """Make ``missing``, each as soon as its inputs are there; what depends on one that ``failed`` is not begun."""
+    lacked = set(missing)
+    lacking = {task: {one for _, one in task.inputs if one in lacked} for task in missing}
+    waiting: dict[Task, list[Task]] = {}
+    for task, inputs in lacking.items():
+        for one in inputs:
+            waiting.setdefault(one, []).append(task)
+    ready = deque(task for task, inputs in lacking.items() if not inputs)
     running: dict[Future[Made], Task] = {}
-    while True:
-        ready = [task for task, inputs in lacking.items() if not inputs]
-        for task in ready[: pipeline.workers.width - len(running)]:
-            running[pipeline.workers.submit(make, Making(pipeline.store.root, task))] = task
-            del lacking[task]
-        if not running:
-            return
+    root = pipeline.store.root.absolute()
+    while ready or running:
+        while ready and len(running) < pipeline.workers.width:
+            task = ready.popleft()
+            running[pipeline.workers.submit(make, Making(root, task))] = task
         for future in done(running):
             task = running.pop(future)
             try:
-                made = result(future)
-            except (StorageError, WorkerDiedError):  # the next one would fare no better
+                made = pipeline.workers.result(future)
+            except FATAL:
                 raise
-            except KoopError:
+            except KoopError as error:
+                failed[task] = error
                 continue
-            for inputs in lacking.values():
-                inputs.discard(task)
+            for other in waiting.get(task, ()):
+                lacking[other].discard(task)
+                if not lacking[other]:
+                    ready.append(other)
             yield made
 
 

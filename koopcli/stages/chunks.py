@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -101,10 +102,10 @@ class ChunkedWork:
         missing = [chunk for chunk in chunks if chunk.i not in found]
         if len(missing) < len(chunks):
             self.note(f"{len(chunks) - len(missing)} of {len(chunks)} chunks were already there")
-        alone = self.workers.count == 1
-        jobs = missing if alone else [replace(chunk, at_hand=None, progress=silent) for chunk in missing]
+        alone, root = self.workers.alone, self.store.folder()
+        jobs = missing if alone else [replace(one, root=root, at_hand=None, progress=silent) for one in missing]
         ready = count - sum(chunk.stop - chunk.start for chunk in missing)
-        for chunk, warned in self.workers.each(commit, jobs):
+        for chunk, warned in self.workers.each(commit, jobs, root):
             for text in warned:
                 self.store.warn(text)
             ready += chunk.stop - chunk.start
@@ -126,9 +127,13 @@ class _GoneError(Exception):
     """An input is no longer in the store, or no longer good."""
 
 
-@lru_cache(maxsize=1)
 def _store(root: Path) -> Store:
-    """One store a process, which sweeps litter once."""
+    """One store for each thread of a process, which sweeps litter once and has its own ear for warnings."""
+    return _store_of(root, threading.get_ident())
+
+
+@lru_cache(maxsize=64)
+def _store_of(root: Path, thread: int) -> Store:
     return Store(root)
 
 

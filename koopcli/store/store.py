@@ -24,6 +24,7 @@ from koopcli.store import image
 from koopcli.store.files import (
     Published,
     UntrustedFileError,
+    make_folder,
     open_regular,
     publish,
     read_small,
@@ -159,6 +160,12 @@ class Store:
         if not path.exists():  # a collection took it for an orphan just before its record was there
             self._put(packed, self._object_path)
         return record
+
+    def folder(self) -> Path:
+        """The absolute path of the store's folder, which is there from now on."""
+        with storage_errors(self.root):
+            make_folder(self.root)
+        return self.root.absolute()
 
     def require(self, needed: float) -> None:
         """Raise ``StorageError`` where the disk has no room for ``needed`` bytes."""

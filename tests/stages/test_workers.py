@@ -41,31 +41,31 @@ def interrupt(job: int) -> int:
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_every_job_is_done_once(count):
+def test_every_job_is_done_once(count, tmp_path):
     with Workers(count) as workers:
-        assert sorted(workers.each(double, range(20))) == [(i, 2 * i) for i in range(20)]
+        assert sorted(workers.each(double, range(20), tmp_path)) == [(i, 2 * i) for i in range(20)]
     assert not multiprocessing.active_children()
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_an_error_of_a_job_is_the_commands(count):
+def test_an_error_of_a_job_is_the_commands(count, tmp_path):
     with pytest.raises(StorageError, match="full"), Workers(count) as workers:
-        list(workers.each(refuse, range(5)))
+        list(workers.each(refuse, range(5), tmp_path))
 
 
-def test_an_interrupt_here_is_not_swallowed():
+def test_an_interrupt_here_is_not_swallowed(tmp_path):
     with pytest.raises(KeyboardInterrupt), Workers() as workers:
-        list(workers.each(interrupt, range(5)))
+        list(workers.each(interrupt, range(5), tmp_path))
 
 
-def test_a_killed_worker_is_one_clear_error():
+def test_a_killed_worker_is_one_clear_error(tmp_path):
     with pytest.raises(InvalidValueError, match="fewer --workers"), Workers(2) as workers:
-        list(workers.each(end, range(5)))
+        list(workers.each(end, range(5), tmp_path))
 
 
-def test_leaving_by_an_error_stops_the_workers():
+def test_leaving_by_an_error_stops_the_workers(tmp_path):
     def go_wrong(workers):
-        next(workers.each(double, range(20)))
+        next(workers.each(double, range(20), tmp_path))
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError), Workers(2) as workers:
@@ -197,11 +197,11 @@ def test_a_worker_whose_inputs_are_gone_leaves_its_chunk_to_the_command(tmp_path
     task = recipes.simulation(load_experiment("paper", parse_set(CHUNKED)))
     real = Workers.each
 
-    def collected(self, function, jobs):
+    def collected(self, function, jobs, store_root):
         for path in (store.root / "records" / "sample").iterdir():
             path.unlink()
         chunks._content.cache_clear()
-        return real(self, function, jobs)
+        return real(self, function, jobs, store_root)
 
     monkeypatch.setattr(Workers, "each", collected)
     with Workers(2) as workers:

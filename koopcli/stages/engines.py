@@ -1,0 +1,212 @@
+"""What runs jobs: this process, processes of this machine, or a Dask cluster; each a ``concurrent.futures.Executor``."""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, field
+from multiprocessing.connection import wait as wait_for
+from pathlib import Path
+from typing import Any, Protocol
+
+from koopcli.errors import InvalidValueError
+
+MOST = 256
+ANSWERS_WITHIN = 10  # seconds
+
+
+class Engine(Protocol):
+    """Starts and stops an executor."""
+
+    @property
+    def alone(self) -> bool:
+        """Whether jobs run in this process, one after another."""
+
+    @property
+    def width(self) -> int:
+        """How many jobs to begin at a time, so that every worker is busy."""
+
+    def start(self, store: Path) -> Executor:
+        """The executor for jobs on the ``store``."""
+
+    def stop(self, executor: Executor, *, at_once: bool) -> None:
+        """Stop it, ``at_once`` if what is begun is no longer wanted."""
+
+    def died(self, error: BaseException) -> str | None:
+        """What happened to a worker or to the engine where ``error`` says that one is gone, and what to do."""
+
+
+@dataclass(frozen=True)
+class Here:
+    """This process."""
+
+    alone = True
+    width = 1
+
+    def start(self, store: Path) -> Executor:
+        """Runs a job when it is submitted."""
+        return _AtOnce()
+
+    def stop(self, executor: Executor, *, at_once: bool) -> None:
+        """Nothing is running."""
+
+    def died(self, error: BaseException) -> None:
+        """Then nobody would ask."""
+
+
+class _AtOnce(Executor):
+    """Runs a job when it is submitted; what it raises is raised there, an interrupt too."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """The future of a job that is done."""
+        future: Future[Any] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+@dataclass(frozen=True)
+class Processes:
+    """``count`` processes of this machine, which start afresh when the first job needs them."""
+
+    count: int
+
+    alone = False
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.count <= MOST:
+            raise InvalidValueError(f"'--workers' must be from 1 to {MOST}, got {self.count}")
+
+    @property
+    def width(self) -> int:
+        """One more for each that is at work."""
+        return 2 * self.count
+
+    def start(self, store: Path) -> Executor:
+        """A pool of processes."""
+        context = multiprocessing.get_context("spawn")
+        return ProcessPoolExecutor(self.count, context, initializer=_end_with_parent)
+
+    def stop(self, executor: Executor, *, at_once: bool) -> None:
+        """End the processes; what they have committed stays."""
+        executor.shutdown(wait=not at_once, cancel_futures=True)
+        if at_once:
+            for process in multiprocessing.active_children():
+                process.terminate()
+
+    def died(self, error: BaseException) -> str | None:
+        """A process that was ended from outside breaks the pool."""
+        if isinstance(error, BrokenProcessPool):
+            return "a worker process died, most likely for want of memory: choose fewer --workers"
+        return None
+
+
+@dataclass
+class Cluster:
+    """A running Dask cluster by the ``address`` of its scheduler, or by the scheduler file (.json) that it wrote.
+
+    Its workers see the same store as this process, and have the same koopcli. One that is killed costs what it was
+    doing: the scheduler gives that to another.
+    """
+
+    address: str
+    _client: Any = field(default=None, repr=False)
+
+    alone = False
+
+    @property
+    def width(self) -> int:
+        """Two jobs for each thread that the workers have now."""
+        threads = sum(self._client.nthreads().values()) if self._client is not None else 0
+        return max(2, 2 * threads)
+
+    def start(self, store: Path) -> Executor:
+        """The cluster's own executor. Raises ``InvalidValueError`` where it is not there or of no use here."""
+        try:
+            from distributed import Client  # noqa: PLC0415  (an extra)
+        except ModuleNotFoundError as error:
+            raise InvalidValueError(
+                "--cluster needs Dask distributed, which is not installed: pip install 'koopcli[dask]'"
+            ) from error
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in one line
+        file = {"scheduler_file": self.address} if self.address.endswith(".json") else {"address": self.address}
+        if "scheduler_file" in file and not Path(self.address).is_file():
+            raise InvalidValueError(f"--cluster {self.address}: there is no such scheduler file")
+        try:
+            client: Any = Client  # without types
+            self._client = client(**file, timeout=ANSWERS_WITHIN, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            raise InvalidValueError(
+                f"--cluster {self.address}: no Dask scheduler answers there: begin one with 'dask scheduler', workers "
+                "with 'dask worker', and give the address that it prints"
+            ) from error
+        try:
+            self._look(store)
+        except BaseException:
+            self._client.close()
+            raise
+        executor: Executor = self._client.get_executor(pure=False)
+        return executor
+
+    def stop(self, executor: Executor, *, at_once: bool) -> None:
+        """Leave the cluster. What is running there ends as it would; what waits is called off."""
+        client, self._client = self._client, None
+        try:
+            executor.shutdown(wait=not at_once)
+        finally:
+            client.close(timeout=ANSWERS_WITHIN)
+
+    def died(self, error: BaseException) -> str | None:
+        """Jobs whose workers died again and again, and those of a scheduler that is gone."""
+        if type(error).__name__ == "KilledWorker":
+            return f"the workers of {self.address} died over one job, most likely for want of memory: give them more"
+        if isinstance(error, CancelledError) or type(error).__name__ in ("CommClosedError", "FutureCancelledError"):
+            return f"the Dask cluster at {self.address} is gone: begin it again"
+        return None
+
+    def _look(self, store: Path) -> None:
+        """Refuse workers of another koop, and those that do not see the store."""
+        from koopcli import __version__  # noqa: PLC0415
+
+        try:
+            found = self._client.run(_seen_from_here, str(store))
+        except Exception as error:  # whatever a worker without koopcli makes of it
+            raise InvalidValueError(
+                f"--cluster {self.address}: its workers cannot load koopcli {__version__}: install it where they run"
+            ) from error
+        if not found:
+            raise InvalidValueError(f"--cluster {self.address} has no workers: begin some with 'dask worker'")
+        for worker, (version, there) in found.items():
+            if version != __version__:
+                raise InvalidValueError(
+                    f"--cluster {self.address}: the worker {worker} has koopcli {version}, this is {__version__}: "
+                    "install one version everywhere"
+                )
+            if not there:
+                raise InvalidValueError(
+                    f"--cluster {self.address}: the worker {worker} does not see the store {store}: choose a --store "
+                    "on a file system that all of them share"
+                )
+
+
+def _seen_from_here(store: str) -> tuple[str, bool]:
+    """On a worker: its version of koopcli, and whether it sees the folder ``store``."""
+    from koopcli import __version__  # noqa: PLC0415
+
+    return __version__, os.path.isdir(store)
+
+
+def _end_with_parent() -> None:
+    """End this worker when the process that began it is gone, by whatever means."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None, "this runs in a worker"
+
+    def watch() -> None:
+        wait_for([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
