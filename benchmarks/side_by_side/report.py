@@ -78,7 +78,9 @@ def ratios(results: Results) -> str:
             return
         best = min(seen, key=seen.__getitem__)
         mine, theirs = results.median(dataset, "koop", ours), seen[best]
-        lines.append(f"| {dataset}: {what} | {mine:.3g}, {best} {theirs:.3g}: 1 / {theirs / mine:.1f} | {aim} |")
+        places = 0 if figure == "growth" else 2
+        both = f"{mine:.{places}f}, {best} {theirs:.{places}f}"
+        lines.append(f"| {dataset}: {what} | {both}: 1 / {theirs / mine:.1f} | {aim} |")
 
     line("fit, lifting not counted for the package, CPU s", "product", "fit", "fit", "≤ 1/10")
     line("fit with lifting, CPU s", "product", "fit_and_lifting", "fit", "≤ 1/10")

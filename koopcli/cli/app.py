@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import koopcli
-from koopcli.cli import comparing, keeping, looking, making, plotting, reproduce, vehicles
+from koopcli.cli import comparing, keeping, looking, making, plotting, reproduce, sweeping, vehicles
 
 app = typer.Typer(
     name="koop",
@@ -21,6 +21,7 @@ app = typer.Typer(
 )
 reproduce.register(app)
 making.register(app)
+sweeping.register(app)
 plotting.register(app)
 looking.register(app)
 comparing.register(app)

@@ -49,8 +49,8 @@ ClusterOption = Annotated[
     typer.Option(
         "--cluster",
         metavar="ADDRESS",
-        help="Share the work on a Dask cluster instead: the address of its scheduler, or the .json file it wrote. Needs "
-        "the extra koopcli[dask], and a store that all workers see.",
+        help="Share the work on a Dask cluster instead: the address of its scheduler, or the .json file that it wrote. "
+        "Needs the extra koopcli[dask], and a store that all workers see.",
     ),
 ]
 ExperimentOption = Annotated[

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import os
-from io import StringIO
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
 from koopcli.checks import candidates
-from koopcli.cli.invocation import begin, print_json, write_csv
+from koopcli.cli.invocation import begin, print_json
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption, complete_name
+from koopcli.cli.outputs import CsvOption, OutputOption, check_outputs, image_format, write_outputs
 from koopcli.config.changes import SECTIONS, flat
-from koopcli.config.pictures import FigureName, ImageFormat
+from koopcli.config.pictures import FigureName
 from koopcli.console import show_table
-from koopcli.errors import InvalidValueError, StorageError, UnknownNameError, UsageError
+from koopcli.errors import UnknownNameError, UsageError
 
 if TYPE_CHECKING:
     from koopcli.figures.registry import FigureKind
@@ -29,13 +27,8 @@ def plot(
         list[str] | None,
         typer.Argument(autocompletion=complete_name, metavar="ARTEFACT", help="What to draw; made when left out."),
     ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="FILE", help="Write the image: .png, .svg or .pdf."),
-    ] = None,
-    csv_: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE", help="Write the numbers that are drawn, as a table.")
-    ] = None,
+    output: OutputOption = None,
+    csv_: CsvOption = None,
     label: Annotated[
         list[str] | None,
         typer.Option(metavar="TEXT", help="What an artefact is called beside others: one for each, in their order."),
@@ -58,12 +51,8 @@ def plot(
         raise UsageError(f"which figure? Name one of: {', '.join(get_args(FigureName))}")
     if figure not in get_args(FigureName):
         raise UnknownNameError(f"unknown figure '{figure}'{candidates(figure, get_args(FigureName))}")
-    image = _format(output)
-    if output is not None and csv_ is not None and output.resolve() == csv_.resolve():
-        raise UsageError(f"{output} cannot be both the image and its numbers: name two files")
-    for path in (output, csv_):
-        if path is not None and (path.is_dir() or not os.access(path if _in_place(path) else path.parent, os.W_OK)):
-            raise StorageError(f"cannot write {path}: name a file in a folder that can be written to")
+    image = image_format(output)
+    check_outputs(output, csv_)
     call = begin(store, experiment, set_, SECTIONS)
     from koopcli.figures.registry import FIGURES
     from koopcli.stages import drawn
@@ -82,14 +71,7 @@ def plot(
     labels = _labels(label, sources, kind)
 
     def export(artefact: Artefact) -> None:
-        if output is not None:
-            _write(output, artefact.content.image)
-            call.console.note(f"wrote {output}")
-        if csv_ is not None:
-            text = StringIO()
-            write_csv(artefact.content, text)
-            _write(csv_, text.getvalue().encode())
-            call.console.note(f"wrote {csv_}")
+        write_outputs(call.console, artefact.content.image, output, artefact.content, csv_)
         if output is None and csv_ is None and not as_json:
             call.console.note("add -o FILE.png, .svg or .pdf to write the image, --csv FILE for its numbers")
 
@@ -107,35 +89,6 @@ def _labels(given: list[str] | None, sources: list[Task], kind: FigureKind) -> d
     if len(given) != len(sources):
         raise UsageError(f"--label is given {len(given)} times for {len(sources)} artefacts: give one for each")
     return dict(zip(sources, given, strict=True))
-
-
-def _format(output: Path | None) -> ImageFormat:
-    if output is None:
-        return "png"
-    ending = output.suffix.lower().lstrip(".")
-    for known in get_args(ImageFormat):
-        if ending == known:
-            return known  # type: ignore[no-any-return]
-    raise InvalidValueError(f"{output}: unknown ending; write to a file ending in .{', .'.join(get_args(ImageFormat))}")
-
-
-def _in_place(path: Path) -> bool:
-    """Whether ``path`` must be written where it is: a device, a pipe, or a link that stays one."""
-    return path.exists() and (path.is_symlink() or not path.is_file())
-
-
-def _write(path: Path, content: bytes) -> None:
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        if _in_place(path):
-            path.write_bytes(content)
-            return
-        beside.write_bytes(content)
-        os.replace(beside, path)
-    except OSError as error:
-        raise StorageError(f"cannot write {path}: {error.strerror}") from error
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def _list(*, as_json: bool) -> None:

@@ -36,7 +36,7 @@ def parse_set(assignments: Sequence[str]) -> Changes:
             raise UsageError(f"--set {text}: write --set stage.key=value, such as --set vehicle.Jzz=1731")
         if section not in SECTIONS:
             raise UsageError(f"--set {text}: unknown stage '{section}'{candidates(section, SECTIONS)}")
-        given.append((name.strip(), _toml_value(raw)))
+        given.append((name.strip(), toml_value(raw)))
     return nested(given)
 
 
@@ -63,7 +63,7 @@ def flat(changes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
             yield f"{prefix}{key}", value
 
 
-def _toml_value(text: str) -> object:
+def toml_value(text: str) -> object:
     """``text`` as one TOML value, or as it stands."""
     try:
         parsed = tomllib.loads(f"value = {text}")

@@ -14,6 +14,7 @@ FigureName = Literal[
     "trajectory",
     "orders",
     "best-order",
+    "sweep",
     "random-input",
     "energy-surface",
     "error-map",

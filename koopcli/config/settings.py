@@ -257,3 +257,19 @@ class Reproduce:
         unit="s",
         help="beyond: simulated seconds, the main first",
     )
+
+
+@dataclass(frozen=True)
+class SweepAxis:
+    """One swept setting by its full ``name``, and its ``values`` as they are written on the command line."""
+
+    name: str
+    values: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A grid of settings. ``places``: of each cell the place of its value on each axis, -1 where it has no effect."""
+
+    axes: tuple[SweepAxis, ...]
+    places: tuple[tuple[int, ...], ...]

@@ -14,7 +14,7 @@ from typing import Any, Literal
 from koopcli.config.pictures import Plot
 from koopcli.figures.drawing import Drawing, sources_of
 
-Takes = Literal["evaluation", "predictor", "fit", "sample", "trajectories", "nothing"]
+Takes = Literal["evaluation", "predictor", "fit", "sample", "trajectories", "sweep", "nothing"]
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,7 @@ FIGURES: dict[str, FigureKind] = {
         "draws",
         draws="points",
     ),
+    "sweep": FigureKind("RMSE over a swept grid of settings", "sweep", ("sweep",), "sweep"),
     "random-input": FigureKind(
         "one trajectory under random inputs, true and predicted, with restarts",
         "predictor",

@@ -46,7 +46,7 @@ def _least_squares(columns: Regressors, ridge: float, free: list[int], over: Ove
 
     The ridge (4.7) leaves the columns ``free``: the constant and B, which the data determine well.
     """
-    ways = [(True, "normal equations by moments")] if moments_pay(columns) else []
+    ways = [(True, "moments")] if moments_pay(columns) else []
     for by_moments, way in [*ways, (False, "normal equations")]:
         scaled = Scaled.of(together(over(Sum(columns, by_moments))), ridge, free)
         if scaled.harmless:

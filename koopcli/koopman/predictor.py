@@ -35,7 +35,7 @@ class Predictor:
     what was identified, as JSON; ``rank`` of ``directions`` and ``condition`` of the regression; ``horizon``: the steps
     that it may be asked for, None for any; ``missed``: the share of the data in percent that its exponentials do not
     hold; ``beyond``: what it does outside the hull of its data; ``trust``: an estimate of its errors; ``solved_by``:
-    how the regression was solved.
+    how the regression was solved, as :mod:`koopcli.koopman.blockwise` and ``product`` name it.
     """
 
     observables: Lift

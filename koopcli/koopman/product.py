@@ -60,5 +60,5 @@ def fit_product(
     each = functions if bilinear else 1
     directions = functions + each * int(inputs.moving.sum())
     rank = solution.rank * (1 + r) if bilinear else solution.rank + r
-    way = f"averages over the inputs, {solution.solved_by}"
+    way = "averages" if solution.solved_by == "normal equations" else f"averages, {solution.solved_by}"
     return operators(A, B, N, inputs, basis, solution, rank=rank, directions=directions, solved_by=way)

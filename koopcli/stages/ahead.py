@@ -96,7 +96,7 @@ def _each(pipeline: Pipeline, missing: list[Task], failed: dict[Task, KoopError]
             for other in waiting.get(task, ()):
                 lacking[other].discard(task)
                 if not lacking[other]:
-                    ready.append(other)
+                    ready.appendleft(other)  # what is begun is finished first
             yield made
 
 

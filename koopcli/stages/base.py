@@ -142,5 +142,7 @@ class Stage:
     """What making the task will cost, its inputs aside."""
     chunk: Callable[[Any, Inputs, slice, Progress], Packed] | None = None
     """Of a stage that asks for chunks: (settings, inputs, rows, progress) -> what one of them holds."""
+    keep: Callable[[Any], Any] = lambda content: content
+    """What of an input's content ``run`` works with: the rest is let go of as soon as it is read."""
     predicts: Callable[[Task], Prospect] | None = None
     """Of a stage that makes predictors: what a task's one will be."""

@@ -14,7 +14,7 @@ from koopcli.config.settings import Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError
 from koopcli.figures import source_digest
 from koopcli.figures.registry import FIGURES, FigureKind
-from koopcli.stages import recipes
+from koopcli.stages import grid, recipes
 from koopcli.stages.base import Task
 from koopcli.stages.makers import LIFTED, MAKERS
 from koopcli.stages.naming import names, points
@@ -26,6 +26,7 @@ TAKES: dict[str, tuple[str, ...]] = {
     "fit": LIFTED,
     "sample": ("sample",),
     "trajectories": ("simulate",),
+    "sweep": ("sweep",),
     "nothing": (),
 }
 TOLD_BESIDE = ("test", "plot")  # sections that matter beside a named predictor
@@ -57,6 +58,12 @@ MADE: dict[str, Made] = {
         reads=("reproduce.orders", "reproduce.full_draws"),
         fixed=("fit-edmd.order", "sample.seed", "sample.grid.seed", "reproduce.draw"),
         instead="it sweeps reproduce.orders over reproduce.full_draws random grids",
+    ),
+    "sweep": Made(
+        lambda experiment: [grid.order_grid(experiment)],
+        reads=("reproduce.orders", "reproduce.draw_seeds"),
+        fixed=("fit-edmd.order", "sample.seed", "sample.grid.seed", "reproduce.draws"),
+        instead="it sweeps reproduce.orders over reproduce.draw_seeds; koop sweep sweeps anything",
     ),
     "eigen": Made(lambda experiment: [recipes.evaluation(experiment, recipes.fit_eigen(experiment))]),
     "beside": Made(

@@ -1,4 +1,4 @@
-"""What runs jobs: this process, processes of this machine, or a Dask cluster; each a ``concurrent.futures.Executor``."""
+"""What runs jobs, as a ``concurrent.futures.Executor``: this process, some of this machine, or a Dask cluster."""
 
 from __future__ import annotations
 

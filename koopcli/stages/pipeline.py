@@ -78,7 +78,7 @@ class Pipeline:
                 return
             for _, upstream in step.inputs:
                 visit(upstream)
-            steps[step] = Step(step, "make", step.name, _cost(step))
+            steps[step] = Step(step, "make", step.name, cost(step))
 
         self.check(task)
         visit(task)
@@ -168,8 +168,11 @@ class Pipeline:
     def _build(self, task: Task) -> tuple[Record, Any, bool]:
         """Make ``task`` under its lock, unless another process has just done so."""
         stage = STAGES[task.stage]
-        self.store.require(_cost(task).bytes)  # before anything is made for it
-        inputs = {role: self._obtain(upstream)[:2] for role, upstream in task.inputs}
+        self.store.require(cost(task).bytes)  # before anything is made for it
+        inputs = {}
+        for role, upstream in task.inputs:
+            record, content, _ = self._obtain(upstream)
+            inputs[role] = (record, stage.keep(content))
         recipe = recipe_of(task, {role: record for role, (record, _) in inputs.items()})
         key = key_of(recipe)
         if task.key not in (None, key):
@@ -212,7 +215,7 @@ class Pipeline:
         lineage = {role: f"{record.stage}/{record.key}" for role, (record, _) in inputs.items()}
         with self.reporter.progress(stage.name) as progress:
             whole = Chunk(self.store.root, task.stage, task.settings, key, tuple(lineage.items()), at_hand=contents)
-            chunks = ChunkedWork(self.store, whole, self.workers, progress, self.reporter.note, _cost(task).bytes)
+            chunks = ChunkedWork(self.store, whole, self.workers, progress, self.reporter.note, cost(task).bytes)
             packed = stage.run(task.settings, contents, Context(progress, self.reporter.warn, chunks)).pack()
         return self.store.commit(recipe, lineage, packed, provenance(time.perf_counter() - start))
 
@@ -234,7 +237,7 @@ class Pipeline:
             self.reporter.note(f"{name:<24} {what}")
 
 
-def _cost(task: Task) -> Cost:
+def cost(task: Task) -> Cost:
     """What making ``task`` will cost, as far as what it is made from is known."""
     try:
         return STAGES[task.stage].estimate(task)

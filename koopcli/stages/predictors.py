@@ -21,7 +21,7 @@ def figures(predictor: Predictor) -> Meta:
 
 def describe(figures: Meta) -> str:
     """The same in a few words."""
-    way = f", {figures['solved_by']}" if figures["solved_by"] else ""
+    way = f", by {figures['solved_by']}" if figures["solved_by"] else ""
     return (
         f"{figures['functions']} functions, rank {figures['rank']} of {figures['directions']}, "
         f"condition {figures['condition']:.2g}, spectral radius {figures['spectral_radius']:.6f}{way}"

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from koopcli.stages import evaluate, plot, sample, simulate
+from koopcli.stages import evaluate, plot, sample, simulate, sweep
 from koopcli.stages.base import Stage
 from koopcli.stages.makers import MAKERS
 
 STAGES: dict[str, Stage] = {
-    stage.name: stage for stage in (sample.STAGE, simulate.STAGE, *MAKERS.values(), evaluate.STAGE, plot.STAGE)
+    stage.name: stage
+    for stage in (sample.STAGE, simulate.STAGE, *MAKERS.values(), evaluate.STAGE, sweep.STAGE, plot.STAGE)
 }

@@ -59,9 +59,9 @@ def test_a_small_change_of_any_stage_is_found(stage, pins, monkeypatch):
 
 def test_a_changed_figure_is_found_too(pins, monkeypatch):
     """What scripts read is pinned as well as the arrays."""
-    from koopcli.koopman import edmd
+    from koopcli.koopman import operators
 
-    monkeypatch.setattr(edmd, "condition_number", lambda values: 2.0 * values.max() / values.min())
+    monkeypatch.setattr(operators, "condition_number", lambda values: 2.0 * values.max() / values.min())
     assert "raise its version" in complaint("fit-edmd", pins)
 
 

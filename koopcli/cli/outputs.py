@@ -1,0 +1,73 @@
+"""Files that a command writes for the user, beside the store."""
+
+from __future__ import annotations
+
+import os
+from io import StringIO
+from pathlib import Path
+from typing import Annotated, Any, get_args
+
+import typer
+
+from koopcli.cli.invocation import write_csv
+from koopcli.config.pictures import ImageFormat
+from koopcli.console import Console
+from koopcli.errors import InvalidValueError, StorageError, UsageError
+
+OutputOption = Annotated[
+    Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write the image: .png, .svg or .pdf.")
+]
+CsvOption = Annotated[
+    Path | None, typer.Option("--csv", metavar="FILE", help="Write the numbers that are drawn, as a table.")
+]
+
+
+def image_format(output: Path | None) -> ImageFormat:
+    """The format of the image that is asked for. Raises ``InvalidValueError`` for an unknown ending."""
+    if output is None:
+        return "png"
+    ending = output.suffix.lower().lstrip(".")
+    for known in get_args(ImageFormat):
+        if ending == known:
+            return known  # type: ignore[no-any-return]
+    raise InvalidValueError(f"{output}: unknown ending; write to a file ending in .{', .'.join(get_args(ImageFormat))}")
+
+
+def check_outputs(output: Path | None, csv: Path | None) -> None:
+    """Refuse files that cannot be written, before anything is made."""
+    if output is not None and csv is not None and output.resolve() == csv.resolve():
+        raise UsageError(f"{output} cannot be both the image and its numbers: name two files")
+    for path in (output, csv):
+        if path is not None and (path.is_dir() or not os.access(path if _in_place(path) else path.parent, os.W_OK)):
+            raise StorageError(f"cannot write {path}: name a file in a folder that can be written to")
+
+
+def write_outputs(console: Console, image: bytes, output: Path | None, content: Any, csv: Path | None) -> None:
+    """Write the image and the table of ``content`` where they are asked for, and say so."""
+    if output is not None:
+        _write(output, image)
+        console.note(f"wrote {output}")
+    if csv is not None:
+        text = StringIO()
+        write_csv(content, text)
+        _write(csv, text.getvalue().encode())
+        console.note(f"wrote {csv}")
+
+
+def _in_place(path: Path) -> bool:
+    """Whether ``path`` must be written where it is: a device, a pipe, or a link that stays one."""
+    return path.exists() and (path.is_symlink() or not path.is_file())
+
+
+def _write(path: Path, content: bytes) -> None:
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        if _in_place(path):
+            path.write_bytes(content)
+            return
+        beside.write_bytes(content)
+        os.replace(beside, path)
+    except OSError as error:
+        raise StorageError(f"cannot write {path}: {error.strerror}") from error
+    finally:
+        beside.unlink(missing_ok=True)
