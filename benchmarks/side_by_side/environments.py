@@ -46,7 +46,7 @@ def environment(folder: Path, peer: str) -> Path:
     ):
         tried = subprocess.run(step, capture_output=True, text=True, check=False)
         if tried.returncode:
-            errors = [line for line in tried.stderr.splitlines() if line.startswith("ERROR")]
+            errors = [line[7:] for line in tried.stderr.splitlines() if line.startswith("ERROR: ")]
             raise UnavailableError(f"cannot be installed: {errors[-1] if errors else ' '.join(step[1:3])}")
     done.write_text(wanted)
     return python

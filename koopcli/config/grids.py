@@ -12,7 +12,7 @@ from typing import Any
 from koopcli.config.changes import parse_set, toml_value
 from koopcli.errors import InvalidValueError, UsageError
 
-MOST = 100_000  # cells
+MOST = 10_000  # cells
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 RANGE = re.compile(rf"\s*({NUMBER})\s*:\s*({NUMBER})\s*(?::\s*({NUMBER})\s*)?")
 CLOSES = {"[": "]", "{": "}", '"': '"', "'": "'"}

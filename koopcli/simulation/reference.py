@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from koopcli.progress import Progress, silent
 from koopcli.records import Course, FloatArray, Trajectories
@@ -64,6 +63,8 @@ def _sample(rhs: Rhs, x: FloatArray, u: FloatArray, dt: float) -> tuple[FloatArr
         if calls > MOST_CALLS:
             raise _StuckError
         return rhs(y, u)
+
+    from scipy.integrate import solve_ivp  # noqa: PLC0415  (half a second that only this solver needs)
 
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # of one that ends for it

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import logging
-import multiprocessing
 import os
+import socket
 import threading
 from collections.abc import Callable
-from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import CancelledError, Executor, Future
 from dataclasses import dataclass, field
-from multiprocessing.connection import wait as wait_for
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -88,11 +87,16 @@ class Processes:
 
     def start(self, store: Path) -> Executor:
         """A pool of processes."""
+        import multiprocessing  # noqa: PLC0415  (most commands go without)
+        from concurrent.futures import ProcessPoolExecutor  # noqa: PLC0415
+
         context = multiprocessing.get_context("spawn")
         return ProcessPoolExecutor(self.count, context, initializer=_end_with_parent)
 
     def stop(self, executor: Executor, *, at_once: bool) -> None:
         """End the processes; what they have committed stays."""
+        import multiprocessing  # noqa: PLC0415
+
         executor.shutdown(wait=not at_once, cancel_futures=True)
         if at_once:
             for process in multiprocessing.active_children():
@@ -100,6 +104,8 @@ class Processes:
 
     def died(self, error: BaseException) -> str | None:
         """A process that was ended from outside breaks the pool."""
+        from concurrent.futures.process import BrokenProcessPool  # noqa: PLC0415
+
         if isinstance(error, BrokenProcessPool):
             return "a worker process died, most likely for want of memory: choose fewer --workers"
         return None
@@ -133,13 +139,11 @@ class Cluster:
                 "--cluster needs Dask distributed, which is not installed: pip install 'koopcli[dask]'"
             ) from error
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in one line
-        file = {"scheduler_file": self.address} if self.address.endswith(".json") else {"address": self.address}
-        if "scheduler_file" in file and not Path(self.address).is_file():
-            raise InvalidValueError(f"--cluster {self.address}: there is no such scheduler file")
+        client: Any = Client  # without types
         try:
-            client: Any = Client  # without types
-            self._client = client(**file, timeout=ANSWERS_WITHIN, set_as_default=False)
-        except (OSError, ValueError, TypeError) as error:
+            address = self._reached()
+            self._client = client(address, timeout=ANSWERS_WITHIN, set_as_default=False)
+        except (OSError, ValueError, TypeError, KeyError) as error:
             raise InvalidValueError(
                 f"--cluster {self.address}: no Dask scheduler answers there: begin one with 'dask scheduler', workers "
                 "with 'dask worker', and give the address that it prints"
@@ -167,6 +171,18 @@ class Cluster:
         if isinstance(error, CancelledError) or type(error).__name__ in ("CommClosedError", "FutureCancelledError"):
             return f"the Dask cluster at {self.address} is gone: begin it again"
         return None
+
+    def _reached(self) -> str:
+        """The address, itself or in the scheduler file, where something listens: a client that finds nothing is slow
+        to give up and does so on stderr.
+        """
+        from distributed.comm.addressing import get_address_host_port  # noqa: PLC0415
+
+        address = self.address
+        if address.endswith(".json"):
+            address = str(json.loads(Path(address).read_text(encoding="utf-8"))["address"])
+        socket.create_connection(get_address_host_port(address, strict=True), ANSWERS_WITHIN).close()
+        return address
 
     def _look(self, store: Path) -> None:
         """Refuse workers of another koop, and those that do not see the store."""
@@ -202,11 +218,14 @@ def _seen_from_here(store: str) -> tuple[str, bool]:
 
 def _end_with_parent() -> None:
     """End this worker when the process that began it is gone, by whatever means."""
+    import multiprocessing  # noqa: PLC0415
+    from multiprocessing.connection import wait  # noqa: PLC0415
+
     parent = multiprocessing.parent_process()
     assert parent is not None, "this runs in a worker"
 
     def watch() -> None:
-        wait_for([parent.sentinel])
+        wait([parent.sentinel])
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()

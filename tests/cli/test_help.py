@@ -49,6 +49,18 @@ def test_help_needs_no_numerics():
     assert done.stdout.endswith("[]\n")
 
 
+def test_what_is_there_is_found_without_numerics(folder):
+    """A cached hit costs little more than the interpreter: nothing is imported that only making needs."""
+    code = (
+        "import sys; from koopcli.__main__ import main; main(['fit-edmd', '--experiment', '../tiny.toml']); "
+        "print(sorted({'scipy', 'matplotlib', 'multiprocessing', 'distributed', 'rich'} & set(sys.modules)))"
+    )
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "reused" in done.stderr
+    assert done.stdout.endswith("[]\n")
+
+
 def test_a_fit_needs_no_pictures(folder):
     code = (
         "import sys; from koopcli.__main__ import main; "
