@@ -86,7 +86,7 @@ def koop(folder, capsys):
     """Run the command line here; `tiny=True` uses the tiny experiment."""
 
     def run(*args: str, tiny: bool = True) -> Result:
-        making = args and args[0] in (*STAGES, "reproduce")
+        making = args and args[0] in (*STAGES, "sweep", "reproduce")
         extra = ["--experiment", "../tiny.toml"] if tiny and making else []
         capsys.readouterr()
         code = main([*args, *extra])

@@ -190,6 +190,12 @@ def moments_pay(of: Regressors) -> bool:
     return products is not None and WORTH * products.moments * len(_pairs(layout)) <= layout.columns**2
 
 
+def lost_by(gram: FloatArray, direct: FloatArray) -> float:
+    """How far a Gram matrix is from the one summed entry by entry, for columns of norm one."""
+    length = np.sqrt(np.where(np.diag(direct) > 0, np.diag(direct), 1.0))
+    return float(np.abs((gram - direct) / np.outer(length, length)).max())
+
+
 class _Direct:
     """V Vᵀ entry by entry."""
 
@@ -233,8 +239,7 @@ class _Gram:
         mixed = beside @ V.T
         if self.lost is None:
             direct = V @ V.T
-            length = np.sqrt(np.where(np.diag(direct) > 0, np.diag(direct), 1.0))
-            self.lost = float(np.abs((self._whole(sums, mixed) - direct) / np.outer(length, length)).max())
+            self.lost = lost_by(self._whole(sums, mixed), direct)
         self.sums, self.mixed = self.sums + sums, self.mixed + mixed
 
     def total(self) -> tuple[FloatArray, float]:

@@ -14,7 +14,7 @@ from koopcli.reproduction import edmd_cells as blocks
 from koopcli.reproduction.claims import claims_table, scores
 from koopcli.reproduction.edmd_cells import cells
 from koopcli.reproduction.report import REDUCED, Method, Picture, Run, Table, count_text, has_effect, score_text
-from koopcli.stages import drawn
+from koopcli.stages import drawn, grid
 
 NOTES = (
     "The paper does not state the test inputs behind its {paper} %, so three kinds are scored: none, ±{amplitude} N "
@@ -63,6 +63,16 @@ def pictures(experiment: Experiment) -> list[Picture]:
         Picture(
             draw("orders", [task for cell, task in sweep if cell.excitation == excitation]),
             f"The same means for every training draw ({INPUTS[excitation]}).",
+        ),
+        *(
+            [
+                Picture(
+                    draw("sweep", [grid.order_grid(experiment, excitation=excitation)]),
+                    f"Error against the order over all random training draws ({INPUTS[excitation]}).",
+                )
+            ]
+            if "random" in plan.draws
+            else []
         ),
         Picture(
             draw("horizon", blocks.compared(experiment)),

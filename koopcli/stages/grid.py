@@ -92,8 +92,10 @@ def shared_out(every: Sequence[Cell], shards: int, cost: Callable[[Task], float]
     return [[every[n] for n in sorted(mine)] for mine in found]
 
 
-def order_grid(experiment: Experiment) -> Task:
-    """Orders of the basis by seeds of the training grid, as the reproduction has them."""
+def order_grid(experiment: Experiment, **tested: object) -> Task:
+    """Orders of the basis by seeds of the training grid, as the reproduction has them; ``tested``: settings of the
+    test sample to replace.
+    """
     plan, states = experiment.reproduce, experiment.sample("grid")
     if not isinstance(states, GridSample):
         raise InvalidValueError("training draws are those of a grid: sample.kind must be 'grid'")
@@ -104,7 +106,8 @@ def order_grid(experiment: Experiment) -> Task:
         values = dict(settings)
         training = recipes.simulation(experiment, recipes.sample(replace(states, seed=values["sample.seed"])))
         fit = recipes.fit_edmd(recipes.with_order(experiment, values["fit-edmd.order"]), training)
-        chosen.append(Cell(place, recipes.evaluation(experiment, fit)))
+        test = recipes.test_set(experiment, fit.ancestor("simulate").settings, **tested)
+        chosen.append(Cell(place, recipes.evaluation(experiment, fit, test)))
     return sweep(grid, chosen)
 
 

@@ -16,7 +16,7 @@ from koopcli.checks import build
 from koopcli.config.driving import DriveSample, ManoeuvreSample
 from koopcli.config.pictures import Plot, Series, Tyres
 from koopcli.config.samples import BallSample, BoxSample, EllipsoidSample, GreedySample, GridSample, PointSample
-from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Simulate
+from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Simulate, Sweep, SweepAxis
 from koopcli.figures.registry import FIGURES
 from koopcli.koopman.baselines import Forecast
 from koopcli.koopman.coverage import Coverage
@@ -26,6 +26,7 @@ from koopcli.koopman.nodes import Search, nodes_of
 from koopcli.koopman.orthonormal import OrthonormalPolynomials
 from koopcli.koopman.polynomial import Polynomial
 from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.swept import SCORES, Swept
 from koopcli.koopman.tabulated import Tabulated
 from koopcli.koopman.trust import Trust
 from koopcli.progress import silent
@@ -213,8 +214,20 @@ def figure_records(name: str) -> dict:
         "trajectories": _trajectories(7) if kind.takes in ("predictor", "trajectories") else _few(),
         "training": _gliding(),
         "sample": _on_a_surface(),
+        "sweep": _swept(),
     }
     return {f"{i}/{role}": records[role] for i in range(1 if kind.draws == "one" else 2) for role in kind.roles}
+
+
+def _swept() -> Swept:
+    """Orders by terms by seeds, one cell of which has no error."""
+    places = [(i, j, k) for i in range(3) for j in range(2) for k in range(2)]
+    mean = np.array([10.0 / (1 + i) ** (1 + j) + k for i, j, k in places])
+    mean[-1] = np.nan
+    scores = {name: mean * (1 + n) for n, name in enumerate(SCORES)}
+    counts = dict.fromkeys(("functions", "trajectories", "diverged"), np.arange(12.0))
+    names = ("fit-edmd.order", "fit-edmd.terms", "sample.seed")
+    return Swept(names, (("1", "2", "4"), ("linear", "bilinear"), ("0", "1")), np.array(places), {**scores, **counts})
 
 
 def _chunks(stage, settings, inputs):
@@ -332,6 +345,14 @@ TOYS = {
         ),
         (Evaluate(chunk=2, first=1, restart=3), {"predictor": _bilinear(), "trajectories": _trajectories(4)}),
         (Evaluate(chunk=100, first=0), {"predictor": _forecast("linearisation"), "trajectories": _steered()}),
+    ],
+    "sweep": [
+        (
+            Sweep(
+                (SweepAxis("fit-edmd.order", ("1", "2")), SweepAxis("fit-edmd.terms", ("linear",))), ((0, 0), (1, -1))
+            ),
+            {f"{i}/evaluation": _evaluation().figures() for i in range(2)},
+        )
     ],
     "plot": [(figure_settings(name), figure_records(name)) for name in FIGURES],
 }
