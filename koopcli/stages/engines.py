@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import os
 import socket
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Executor, Future
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -17,6 +20,7 @@ from koopcli.errors import InvalidValueError
 
 MOST = 256
 ANSWERS_WITHIN = 10  # seconds
+COUNTED_EVERY = 5  # seconds
 
 
 class Engine(Protocol):
@@ -121,14 +125,19 @@ class Cluster:
 
     address: str
     _client: Any = field(default=None, repr=False)
+    _threads: int = 0
+    _counted: float = -math.inf
 
     alone = False
 
     @property
     def width(self) -> int:
-        """Two jobs for each thread that the workers have now."""
-        threads = sum(self._client.nthreads().values()) if self._client is not None else 0
-        return max(2, 2 * threads)
+        """Two jobs for each thread that the workers have, who may come and go."""
+        if self._client is not None and time.monotonic() > self._counted + COUNTED_EVERY:
+            self._counted = time.monotonic()
+            with suppress(OSError, RuntimeError):  # of a scheduler that is gone the jobs tell
+                self._threads = sum(self._client.nthreads().values())
+        return max(2, 2 * self._threads)
 
     def start(self, store: Path) -> Executor:
         """The cluster's own executor. Raises ``InvalidValueError`` where it is not there or of no use here."""
