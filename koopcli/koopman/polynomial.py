@@ -110,7 +110,7 @@ class Polynomial:
 
     @cached_property
     def products(self) -> Products | None:
-        """Products of two observables by Legendre polynomials, where the family is all products of its factors."""
+        """Products of two observables, where the family is all products of orthonormal factors."""
         factors = [axis for axis in self.axes if isinstance(axis, OrthonormalPolynomials)]
         heads = np.prod([axis.degree + 1 for axis in self.axes[:-1]])
         degrees, choice = self._leading

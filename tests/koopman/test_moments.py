@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from koopcli.koopman.moments import _legendre, products_of
-from koopcli.koopman.orthonormal import OrthonormalPolynomials, orthonormal_polynomials
+from koopcli.koopman.moments import products_of
+from koopcli.koopman.orthonormal import orthonormal_polynomials
 from koopcli.koopman.polynomial import polynomial
 
 
@@ -13,29 +13,36 @@ def axis_on(nodes, degree):
 
 
 @pytest.mark.parametrize("degree", [0, 1, 4, 7, 10])
-def test_a_product_of_two_polynomials_is_its_sum_of_legendre_polynomials(degree):
+def test_a_product_of_two_polynomials_is_its_sum_of_others(degree):
     nodes = np.sort(np.random.default_rng(degree).uniform(-3, 8, 40))
     axis = axis_on(nodes, degree)
     products = products_of([axis])
     t = np.random.default_rng(1).uniform(-3, 8, 50)
-    p, tall = axis(t), products.legendre[0](t)
+    p, wide = axis(t), products.factors[0](t)
     assert products.linear[0].shape == (degree + 1, degree + 1, 2 * degree + 1)
-    found = np.einsum("adm,mn->adn", products.linear[0], tall)
+    found = np.einsum("adm,mn->adn", products.linear[0], wide)
     assert found == pytest.approx(p[:, np.newaxis] * p, abs=1e-12 * np.abs(p).max() ** 2)
 
 
-def test_products_of_legendre_polynomials_are_positive_sums():
-    """Which is why nothing cancels where samples fill their box."""
-    axis = _legendre(OrthonormalPolynomials(0.0, 1.0, np.zeros(0), np.ones(1)), 7)
-    linear = products_of([axis]).linear[0]
-    assert linear.min() >= -1e-14
-    assert np.einsum("adm,m->ad", linear, axis_at_one(14)) == pytest.approx(
-        np.outer(axis_at_one(7), axis_at_one(7)), rel=1e-13
-    )
+CLOUDS = {
+    "uniform": lambda rng: rng.uniform(-1, 1, 5000),
+    "bell": lambda rng: rng.standard_normal(5000),
+    "arcs": lambda rng: np.cos(rng.uniform(0, np.pi, 5000)),
+    "few": lambda rng: np.repeat(np.sort(rng.uniform(-1, 1, 15)), 300),
+    "one-sided": lambda rng: rng.exponential(1.0, 5000),
+}
 
 
-def axis_at_one(degree):
-    return np.sqrt(2 * np.arange(degree + 1) + 1)
+@pytest.mark.parametrize("cloud", CLOUDS)
+def test_little_cancels_wherever_samples_crowd(cloud):
+    """The parts of a product are no larger than a few times the product: so moments keep the digits."""
+    t = CLOUDS[cloud](np.random.default_rng(4))
+    distinct, counts = np.unique(t, return_counts=True)
+    axis = orthonormal_polynomials(distinct, counts / len(t), 7)
+    products = products_of([axis])
+    assert np.abs(products.linear[0]).sum(axis=2).max() < 100
+    (found,) = products.gram(products.sums(t[:, np.newaxis], np.ones((1, len(t)))))
+    assert found / len(t) == pytest.approx(np.eye(8), abs=1e-12)
 
 
 @pytest.mark.parametrize(("states", "order"), [(1, 6), (2, 4), (3, 3)])
