@@ -5,7 +5,8 @@ BIN := $(VENV)/bin
 KOOP := $(BIN)/koop
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-edmd reproduce-eigen reproduce-beyond smoke test check docs pins bench faults traps wheel clean
+.PHONY: help reproduce reproduce-edmd reproduce-eigen reproduce-beyond smoke test check docs pins bench peers scaling faults \
+  traps wheel clean
 
 help: ## Show this help
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 20
@@ -46,6 +47,12 @@ bench: $(VENV)/.developing ## Measure speed and memory as ratios within one run 
 	$(BIN)/python benchmarks/run.py
 	$(BIN)/python benchmarks/store.py
 
+peers: $(VENV)/.developing ## Set koop beside other EDMD packages in one run, each in an environment of its own (a quarter of an hour)
+	$(BIN)/python benchmarks/peers.py
+
+scaling: $(VENV)/.developing ## Measure sizes, sweeps and engines, for docs/scaling.md (a quarter of an hour)
+	$(BIN)/python benchmarks/scaling.py
+
 faults: $(VENV)/.developing ## Count what a store loses under thousands of faults, for docs/reliability.md (minutes)
 	$(BIN)/python -m tests.faults
 
@@ -57,7 +64,7 @@ wheel: $(VENV)/.developing ## Build the wheel into dist/
 	$(BIN)/python -m build --wheel --outdir dist
 
 clean: ## Remove the environment and build leftovers, but no artefacts
-	rm -rf $(VENV) dist build .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) .venv-peers dist build .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find koopcli tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.created:

@@ -143,3 +143,49 @@ def test_test_states_on_a_grid(koop):
 
 
 STATES = (("v_x", "m/s"), ("v_y", "m/s"), ("yaw_rate", "rad/s"))
+
+
+BOX = ("--set", "sample.kind=box", "--set", "sample.steps=3")
+
+
+def several(koop):
+    """Two sets of trajectories of one plant, of different lengths."""
+    one = koop("simulate", *BOX, "--set", "sample.count=60").name
+    other = koop("simulate", "--set", "sample.kind=box", "--set", "sample.count=50", "--set", "sample.seed=3").name
+    return one, other
+
+
+def test_several_trajectories_are_fitted_together(koop):
+    one, other = several(koop)
+    fit = json.loads(koop("fit-edmd", one, other, "--json").out)
+    both = koopcli.load(fit["name"])
+    alone = [koopcli.load(koop("fit-edmd", name).name) for name in (one, other)]
+    assert not any(np.array_equal(both.A, single.A) for single in alone)
+    low, high = (f([single.coverage.domain for single in alone]) for f in (lambda d: d[0][0], lambda d: d[1][1]))
+    assert (both.coverage.domain[0] <= low).all()
+    assert (both.coverage.domain[1] >= high).all()
+    again = koop("fit-edmd", one, other, "--set", "fit-edmd.chunk=37")
+    assert pytest.approx(both.A, rel=1e-8, abs=1e-9) == koopcli.load(again.name).A
+    scored = json.loads(koop("evaluate", fit["name"], "--json").out)
+    assert {"hold", "linear"} <= scored["baselines"].keys()
+    assert koop("show", "--lineage", fit["name"]).out.count("simulate/") == 2
+
+
+def test_trajectories_that_do_not_belong_together_are_refused(koop):
+    one, _ = several(koop)
+    slower = koop("simulate", *BOX, "--set", "simulate.dt=0.02").name
+    one_line(koop("fit-edmd", one, slower), 3, "differ in dt")
+    heavier = koop("simulate", *BOX, "--set", "vehicle.m=1500").name
+    one_line(koop("fit-edmd", one, heavier), 3, "differ in vehicle")
+    one_line(koop("fit-edmd", one, one), 3, "is named twice")
+    one_line(koop("fit-edmd", one, koop("sample").name), 4, "must be of stage simulate")
+    one_line(koop("fit-edmd", one, "nothing"), 4, "no artefact 'nothing'")
+
+
+def test_what_solved_a_fit_is_said(koop):
+    assert json.loads(koop("fit-edmd", "--json").out)["solved_by"] == "averages"
+    one, _ = several(koop)
+    found = koop("fit-edmd", one, "--json")
+    assert json.loads(found.out)["solved_by"] in ("moments", "normal equations")
+    assert f"by {json.loads(found.out)['solved_by']}" in found.err
+    assert json.loads(koop("fit-eigen", "--json").out)["solved_by"] == ""

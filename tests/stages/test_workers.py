@@ -156,6 +156,53 @@ def test_simulations_are_resumed_chunk_by_chunk(tmp_path, alone, monkeypatch):
     assert alone[made.record.name] == made.record.object
 
 
+FIT = ["sample.kind=box", "sample.count=300", "sample.steps=5", "fit-edmd.order=2", "fit-edmd.chunk=160"]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("done", [0, 4, 13, 17])
+def test_fits_are_resumed_chunk_by_chunk_in_every_pass(tmp_path, monkeypatch, done, workers):
+    """Ten chunks look at the samples, ten sum over them; between them lies what the sums work with."""
+    task = recipes.fit_edmd(load_experiment("paper", parse_set(FIT)))
+    whole = Pipeline(Store(tmp_path / "whole"), Listener()).make(task).record
+    store = Store(tmp_path / "broken")
+    Pipeline(store, Listener()).make(task.input("trajectories"))
+    break_off(store, task, done, monkeypatch)
+    heard = Listener()
+    with Workers(workers) as sharing:
+        made = Pipeline(store, heard, sharing).make(task).record
+    assert made.object == whole.object
+    said = [note for note in heard.notes if "chunks were already there" in note]
+    first, second = min(done, 10), max(done - 10, 0)
+    assert said == [f"{n} of 10 chunks were already there" for n in (first, second) if n]
+    assert not list((store.root / "partial").glob("*"))
+
+
+def test_one_long_trajectory_is_shared_as_well_as_many(tmp_path):
+    """A chunk may begin and end inside a trajectory."""
+    long = ["sample.kind=box", "sample.count=2", "sample.steps=700", "fit-edmd.order=1", "fit-edmd.chunk=100"]
+    task = recipes.fit_edmd(load_experiment("paper", parse_set(long)))
+    alone = Pipeline(Store(tmp_path / "alone"), Listener()).make(task).record
+    with Workers(2) as workers:
+        shared = Pipeline(Store(tmp_path / "shared"), Listener(), workers).make(task).record
+    assert shared.object == alone.object
+
+
+def test_damage_to_what_chunks_work_with_is_found(tmp_path, monkeypatch):
+    task = recipes.fit_edmd(load_experiment("paper", parse_set(FIT)))
+    whole = Pipeline(Store(tmp_path / "whole"), Listener()).make(task).record
+    store = Store(tmp_path / "broken")
+    Pipeline(store, Listener()).make(task.input("trajectories"))
+    break_off(store, task, 14, monkeypatch)
+    (given,) = (store.root / "partial" / whole.key).glob("11-*.h5")
+    content = bytearray(given.read_bytes())
+    content[len(content) // 2] ^= 1
+    given.write_bytes(content)
+    with Workers(2) as workers:
+        made = Pipeline(store, Listener(), workers).make(task).record
+    assert made.object == whole.object
+
+
 def test_without_locks_chunks_may_be_cleared_while_they_are_joined(tmp_path, alone, monkeypatch):
     """Another process finishes the artefact just before this one reads its chunks once more: its record wins."""
     from contextlib import nullcontext
