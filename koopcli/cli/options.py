@@ -50,7 +50,7 @@ ClusterOption = Annotated[
         "--cluster",
         metavar="ADDRESS",
         help="Share the work on a Dask cluster instead: the address of its scheduler, or the .json file that it wrote. "
-        "Needs the extra koopcli[dask], and a store that all workers see.",
+        "Needs the extra 'dask', and a store that all workers see.",
     ),
 ]
 ExperimentOption = Annotated[

@@ -6,6 +6,7 @@ import math
 import re
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -19,7 +20,7 @@ from koopcli.cli.options import (
     StoreOption,
     WorkersOption,
 )
-from koopcli.cli.outputs import CsvOption, OutputOption, check_outputs, image_format, write_outputs
+from koopcli.cli.outputs import OutputOption, check_outputs, image_format, write_outputs
 from koopcli.config.grids import Grid, parse_grid
 from koopcli.console import show_table
 from koopcli.errors import InvalidValueError, KoopError, UsageError
@@ -54,7 +55,9 @@ def sweep(
         typer.Option(metavar="I/N", help="Make only the I-th of N parts of about the same cost, as in a job array."),
     ] = None,
     output: OutputOption = None,
-    csv_: CsvOption = None,
+    csv_: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE", help="Write the scores of all cells, as a table.")
+    ] = None,
     workers: WorkersOption = 1,
     cluster: ClusterOption = None,
     experiment: ExperimentOption = "paper",
