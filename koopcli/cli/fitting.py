@@ -43,7 +43,7 @@ def fit_edmd(
     trajectories: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[TRAJECTORIES]...",
+            metavar="TRAJECTORIES",
             autocompletion=complete_name,
             help="Trajectories, or several of one plant to fit together; made from the settings when left out.",
         ),

@@ -20,13 +20,12 @@ FEW = 4096  # samples of a product read together
 
 @dataclass(frozen=True)
 class Survey:
-    """Of ``total`` samples, ``states`` (m, n_x) that steps start from: all, or ``MARGINAL_ROWS`` spread evenly.
+    """``states`` (m, n_x) that steps start from: all, or ``MARGINAL_ROWS`` spread evenly.
 
     ``corners`` (c, n_x) are those that their hull and box hang on; ``triangle`` (1 + n_u, 1 + n_u) is the R of a QR
     factorisation of [1, u]. A product dataset counts every state once, and every input in ``columns`` (m, n_u) once.
     """
 
-    total: int
     states: FloatArray
     corners: FloatArray
     triangle: FloatArray
@@ -67,7 +66,7 @@ def survey(data: Transitions, over: Over) -> Survey:
     if product is not None:
         columns, states = product_factors(product)
         triangle = add_inputs(np.empty((0, 1 + columns.shape[1])), columns)
-        return Survey(len(data), states, corners_of(states), triangle, columns)
+        return Survey(states, corners_of(states), triangle, columns)
     found = list(over(Look()))
     corners = found[0]["corners"]
     for part in found[1:]:
@@ -75,7 +74,7 @@ def survey(data: Transitions, over: Over) -> Survey:
     triangle = found[0]["triangle"]
     for part in found[1:]:
         triangle = np.asarray(np.linalg.qr(np.vstack([triangle, part["triangle"]]), mode="r"))
-    return Survey(len(data), np.concatenate([part["states"] for part in found]), corners, triangle)
+    return Survey(np.concatenate([part["states"] for part in found]), corners, triangle)
 
 
 def add_inputs(triangle: FloatArray, u: FloatArray) -> FloatArray:
