@@ -11,10 +11,15 @@ from samples import Samples
 import koopcli
 from koopcli.koopman import edmd
 from koopcli.koopman.bases import Choice
+from koopcli.koopman.passes import here
+from koopcli.koopman.survey import survey
+from koopcli.koopman.transitions import Transitions
 
 
 class Koop(Competitor):
-    how = "`edmd.basis_from_data` and `edmd.fit` on the stored samples, lifting inside; `Predictor.predict`"
+    how = (
+        "`survey`, `basis_from_data` and `fit` on the stored samples as `koop fit-edmd` does, lifting inside; `predict`"
+    )
     packages = ("koopcli", "numpy", "scipy")
 
     def __init__(self, samples: Samples) -> None:
@@ -25,7 +30,9 @@ class Koop(Competitor):
         """Nothing: the fit lifts."""
 
     def fit(self) -> None:
-        self.predictor = edmd.fit(self.data, edmd.basis_from_data(self.data, Choice("tensor", 7)))
+        pairs = Transitions.of(self.data)
+        seen = survey(pairs, here(pairs))
+        self.predictor = edmd.fit(pairs, edmd.basis_from_data(pairs, Choice("tensor", 7), seen), seen=seen)
 
     def predict(self, x0: np.ndarray, u: np.ndarray) -> np.ndarray:
         return self.predictor.predict(x0, u)

@@ -111,7 +111,6 @@ def fit(
         directions=found.directions,
         condition=found.condition,
         solved_by=found.solved_by,
-        spectral_radius=float(np.abs(np.linalg.eigvals(found.A)).max()),
         plant=pairs.plant,
     )
 

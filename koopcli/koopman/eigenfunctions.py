@@ -148,7 +148,6 @@ def _predictor(
         rank=rank,
         directions=directions,
         condition=condition,
-        spectral_radius=float(np.abs(modes.eigenvalues).max()),
         horizon=reading.horizon,
         plant=trajectories.plant,
         missed=missed,

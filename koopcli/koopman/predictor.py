@@ -49,7 +49,6 @@ class Predictor:
     rank: int
     directions: int
     condition: float
-    spectral_radius: float
     horizon: int | None = None
     plant: Meta = field(default_factory=dict)
     N: FloatArray | None = None
@@ -63,6 +62,12 @@ class Predictor:
     def functions(self) -> int:
         """Dimension N of the lifted state."""
         return len(self.A)
+
+    @cached_property
+    def spectral_radius(self) -> float:
+        """The largest absolute value of A's eigenvalues: of what it predicts without input, above one grows."""
+        eigenvalues = self.A.eigenvalues if isinstance(self.A, Modes) else np.linalg.eigvals(self.A)
+        return float(np.abs(eigenvalues).max())
 
     @property
     def knows_inputs(self) -> bool:
@@ -175,7 +180,7 @@ class Predictor:
             rates = arrays["rates"].values[...]
             couplings = arrays["couplings"].values[...]
             A = Modes(rates[:, 0] + 1j * rates[:, 1], couplings, meta["copies"], meta["dt"])
-        return cls(
+        found = cls(
             observables=_unpack_lift(Packed(_below("lift/", arrays), meta["lift"]), A),
             A=A,
             B=arrays["B"].values[...],
@@ -189,7 +194,6 @@ class Predictor:
             rank=meta["rank"],
             directions=meta["directions"],
             condition=np.inf if meta["condition"] is None else meta["condition"],
-            spectral_radius=meta["spectral_radius"],
             solved_by=meta["solved_by"],
             horizon=meta["horizon"],
             plant=meta["plant"],
@@ -197,6 +201,8 @@ class Predictor:
             beyond=meta["beyond"],
             trust=None if meta["trust"] is None else Trust.unpack(Packed(_below("trust/", arrays), meta["trust"])),
         )
+        vars(found)["spectral_radius"] = meta["spectral_radius"]  # it costs as much as a small fit
+        return found
 
 
 def check_horizon(steps: int, horizon: int | None) -> None:

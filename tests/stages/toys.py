@@ -83,7 +83,7 @@ def _predictor(growth: float = 0.95) -> Predictor:
     basis = Polynomial((axis, axis, axis), np.array(list(np.ndindex(2, 2, 2))))
     A = growth * np.eye(8) + 0.01 * np.cos(np.arange(64.0)).reshape(8, 8)
     B = 1e-4 * np.sin(np.arange(32.0)).reshape(8, 4)
-    return Predictor(basis, A, B, basis.state_map, 0.01, _coverage(), STATES, INPUTS, 12, 12, 1.0, 1.0)
+    return Predictor(basis, A, B, basis.state_map, 0.01, _coverage(), STATES, INPUTS, 12, 12, 1.0)
 
 
 def _coverage() -> Coverage:
@@ -107,7 +107,7 @@ def _looked_up() -> Predictor:
     C = 10 * np.cos(np.arange(18.0)).reshape(3, 6)
     states = 3 * np.sin(np.arange(45.0) ** 2).reshape(3, 5, 3)
     lift = Tabulated(states, nodes_of(states, states.shape[1], Search("nearest", np.ones(3))), starts, modes)
-    found = Predictor(lift, modes, np.zeros((6, 4)), C, 0.01, _coverage(), STATES, INPUTS, 5, 6, 1e3, 1.0, horizon=8)
+    found = Predictor(lift, modes, np.zeros((6, 4)), C, 0.01, _coverage(), STATES, INPUTS, 5, 6, 1e3, horizon=8)
     trust = Trust(states.reshape(15, 3), 1 + np.arange(15.0), np.ones(3), 0.5, 1.5)
     return replace(found, missed=0.7, trust=trust)
 
