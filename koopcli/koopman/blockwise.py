@@ -26,7 +26,7 @@ def fit_blocks(seen: Survey, basis: Basis, bilinear: bool, ridge: float, plain: 
 
     ``over`` runs a pass over all samples, here or spread over many processes.
     """
-    inputs = white_inputs(seen.triangle, centred=basis.constant is not None)
+    inputs = white_inputs(seen.triangle, seen.ends, centred=basis.constant is not None)
     columns = Regressors(basis, inputs, bilinear)
     layout, c = columns.layout, basis.constant
     functions, r = layout.functions, layout.directions

@@ -127,7 +127,7 @@ def why_deficient(data: Data, predictor: Predictor, seen: Survey | None = None) 
     still = [name for name, values in zip(pairs.state_channels.names, x.T, strict=True) if not np.ptp(values)]
     if still:
         causes.append(f"{', '.join(still)} never changes")
-    inputs = white_inputs(seen.triangle, centred=True)
+    inputs = white_inputs(seen.triangle, seen.ends, centred=True)
     if inputs.T.shape[1] < inputs.moving.sum():
         causes.append("inputs move only together")
     return " and ".join(causes)

@@ -8,7 +8,7 @@ import numpy as np
 
 from koopcli.records import Array, BoolArray, FloatArray, Packed
 
-STILL = 64 * np.finfo(float).eps  # of its mean: an input that moves by no more is still
+STILL = 64 * np.finfo(float).eps  # of its size: an input that moves by no more is still
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,11 @@ class WhiteInputs:
         return cls(mean, T, np.empty(0), T.any(axis=1))
 
 
-def white_inputs(triangle: FloatArray, *, centred: bool) -> WhiteInputs:
+def white_inputs(triangle: FloatArray, ends: FloatArray, *, centred: bool) -> WhiteInputs:
     """The inputs about their mean or about zero, from the R (1 + n_u, 1 + n_u) of a QR factorisation of [1, u].
 
-    Its first row holds the sums over all samples, and what is below it the R of the inputs about their mean.
+    Its first row holds the sums over all samples, and what is below it the R of the inputs about their mean. ``ends``
+    (2, n_u), the smallest and largest of each, say whether one moves: of one that does not, R holds rounding.
     """
     total = triangle[0, 0] ** 2
     if centred:
@@ -50,7 +51,7 @@ def white_inputs(triangle: FloatArray, *, centred: bool) -> WhiteInputs:
     else:
         mean, moved = np.zeros(triangle.shape[1] - 1), np.asarray(np.linalg.qr(triangle[:, 1:], mode="r"))
     length = np.linalg.norm(moved, axis=0)
-    moving = length > STILL * np.abs(mean) * np.sqrt(total)
+    moving = np.ptp(ends, axis=0) > STILL * np.abs(ends).max(axis=0) if centred else np.asarray(ends.any(axis=0))
     _, singular, right = np.linalg.svd(moved[:, moving] / length[moving], full_matrices=False)
     keep = singular > singular.max(initial=0.0) * np.finfo(float).eps * total
     T = np.zeros((len(mean), int(keep.sum())))

@@ -28,7 +28,7 @@ def fit_product(
     x, columns = seen.states, seen.columns
     assert columns is not None, "a survey of a product has them"
     states, m = len(x), len(columns)
-    inputs = white_inputs(seen.triangle, centred=True)
+    inputs = white_inputs(seen.triangle, seen.ends, centred=True)
     weights = np.column_stack([np.ones(m), inputs(columns)]) / m
     functions, r = basis.functions, inputs.T.shape[1]
     slope = np.zeros((r, functions))

@@ -23,12 +23,14 @@ class Survey:
     """``states`` (m, n_x) that steps start from: all, or ``MARGINAL_ROWS`` spread evenly.
 
     ``corners`` (c, n_x) are those that their hull and box hang on; ``triangle`` (1 + n_u, 1 + n_u) is the R of a QR
-    factorisation of [1, u]. A product dataset counts every state once, and every input in ``columns`` (m, n_u) once.
+    factorisation of [1, u], and ``ends`` (2, n_u) the smallest and largest of each input. A product dataset counts
+    every state once, and every input in ``columns`` (m, n_u) once.
     """
 
     states: FloatArray
     corners: FloatArray
     triangle: FloatArray
+    ends: FloatArray
     columns: FloatArray | None = None
 
 
@@ -39,16 +41,18 @@ class Look:
     def __call__(self, data: Transitions, span: slice, progress: Progress) -> Found:
         """States, corners and the triangle of a part of the samples."""
         chosen = spread(len(data), MARGINAL_ROWS)
-        states, corners, triangle, start = [], None, np.empty((0, 1 + len(data.input_channels))), span.start
+        n_u = len(data.input_channels)
+        triangle, ends = np.empty((0, 1 + n_u)), np.empty((0, n_u))
+        states, corners, start = [], None, span.start
         for x, u, _ in data.blocks(READ, span):
             first, last = np.searchsorted(chosen, [start, start + len(x)])
             states.append(x[chosen[first:last] - start])
             corners = corners_of(x if corners is None else np.concatenate([corners, x]))
-            triangle = add_inputs(triangle, u)
+            triangle, ends = add_inputs(triangle, u), _ends(ends, u)
             start += len(x)
             progress(start - span.start, span.stop - span.start)
         assert corners is not None, "there is at least one sample"
-        return {"states": np.concatenate(states), "corners": corners, "triangle": triangle}
+        return {"states": np.concatenate(states), "corners": corners, "triangle": triangle, "ends": ends}
 
     def pack(self) -> Packed:
         """Nothing but its kind."""
@@ -66,7 +70,7 @@ def survey(data: Transitions, over: Over) -> Survey:
     if product is not None:
         columns, states = product_factors(product)
         triangle = add_inputs(np.empty((0, 1 + columns.shape[1])), columns)
-        return Survey(states, corners_of(states), triangle, columns)
+        return Survey(states, corners_of(states), triangle, _ends(columns), columns)
     found = list(over(Look()))
     corners = found[0]["corners"]
     for part in found[1:]:
@@ -74,13 +78,20 @@ def survey(data: Transitions, over: Over) -> Survey:
     triangle = found[0]["triangle"]
     for part in found[1:]:
         triangle = np.asarray(np.linalg.qr(np.vstack([triangle, part["triangle"]]), mode="r"))
-    return Survey(np.concatenate([part["states"] for part in found]), corners, triangle)
+    ends = _ends(*(part["ends"] for part in found))
+    return Survey(np.concatenate([part["states"] for part in found]), corners, triangle, ends)
 
 
 def add_inputs(triangle: FloatArray, u: FloatArray) -> FloatArray:
     """The R of [1, u] with more rows ``u`` (n, n_u)."""
     rows = np.hstack([np.ones((len(u), 1)), u])
     return np.asarray(np.linalg.qr(np.vstack([triangle, rows]), mode="r"))
+
+
+def _ends(*inputs: FloatArray) -> FloatArray:
+    """The smallest and largest (2, n_u) of each of the ``inputs`` (n, n_u)."""
+    every = np.concatenate(inputs)
+    return np.stack([every.min(axis=0), every.max(axis=0)])
 
 
 def product_factors(trajectories: Trajectories) -> tuple[FloatArray, FloatArray]:

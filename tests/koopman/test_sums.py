@@ -9,6 +9,7 @@ import pytest
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import blockwise, edmd, regression, sums
+from koopcli.koopman import survey as survey_module
 from koopcli.koopman.bases import Choice
 from koopcli.koopman.blockwise import PASSES
 from koopcli.koopman.inputs import WhiteInputs, white_inputs
@@ -142,23 +143,41 @@ def test_records_that_differ_are_not_fitted_together(data):
             Transitions.of([data, changed])
 
 
-def test_inputs_are_made_white_from_one_triangle():
+@pytest.mark.parametrize("still", [5e3, 0.1, np.pi, 1e-9, 0.0])
+def test_inputs_are_made_white_from_one_triangle(still):
+    """However many blocks go into it: the rounding of an input that stands still adds up, and is no input."""
     rng = np.random.default_rng(6)
-    u = 5 + rng.standard_normal((1000, 3)) @ rng.standard_normal((3, 3))
-    u[:, 1] = 7.1  # never moves
+    u = 5 + rng.standard_normal((40_000, 3)) @ rng.standard_normal((3, 3))
+    u[:, 1] = still
     triangle = np.empty((0, 4))
-    for start in range(0, 1000, 99):
-        triangle = add_inputs(triangle, u[start : start + 99])
-    white = white_inputs(triangle, centred=True)
-    assert white.mean == pytest.approx(u.mean(axis=0), rel=1e-13)
+    for start in range(0, len(u), 199):
+        triangle = add_inputs(triangle, u[start : start + 199])
+    ends = np.stack([u.min(axis=0), u.max(axis=0)])
+    white = white_inputs(triangle, ends, centred=True)
+    assert white.mean == pytest.approx(u.mean(axis=0), rel=1e-12)
     assert white.moving.tolist() == [True, False, True]
     w = white(u)
+    assert w.shape == (40_000, 2)
     assert w.mean(axis=0) == pytest.approx([0, 0], abs=1e-12)
-    assert w.T @ w / 1000 == pytest.approx(np.eye(2), abs=1e-12)
-    about_zero = white_inputs(triangle, centred=False)
-    assert about_zero(u).T @ about_zero(u) / 1000 == pytest.approx(np.eye(3), abs=1e-10)
+    assert w.T @ w / len(u) == pytest.approx(np.eye(2), abs=1e-12)
+    about_zero = white_inputs(triangle, ends, centred=False)
+    used = 3 if still else 2
+    assert about_zero(u).T @ about_zero(u) / len(u) == pytest.approx(np.eye(used), abs=1e-9)
     again = WhiteInputs.unpack(white.pack())
     assert (again(u) == w).all()
+
+
+@pytest.mark.parametrize("still", [5e3, 0.1])
+def test_an_input_that_stands_still_through_many_blocks_moves_nothing(plant, still, monkeypatch):
+    monkeypatch.setattr(survey_module, "READ", 50)
+    sample = box_sample(3000)
+    inputs = sample.inputs.copy()
+    inputs[..., 2] = still
+    data = trajectories_of(plant, replace(sample, inputs=inputs), 1)
+    found = edmd.fit(data, edmd.basis_from_data(data, Choice("total", 1)))
+    assert found.rank == found.directions == 7
+    assert not found.B[:, 2].any()
+    assert found.condition < 10
 
 
 def test_a_survey_in_parts_is_the_survey(data):
