@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -82,12 +82,13 @@ def sweep(
     check_outputs(output, csv_)
     call = begin(store, experiment, None, (), None, workers, cluster)
     from koopcli.stages import grid as grids
+    from koopcli.stages.grid import words
     from koopcli.stages.pipeline import cost
 
     with call.console.progress("cells") as progress:
         every = grids.cells(grid, method, experiment, call.pipeline.check, progress)
     chosen = [cell for cell in every if not cell.refused]
-    _say_refused(call, grid, every)
+    _say_left_out(call, grid, every)
     if part is not None:
         i, n = part
         chosen = grids.shared_out(chosen, n, lambda task: cost(task).seconds)[i - 1]
@@ -104,19 +105,24 @@ def sweep(
     made = [cell for cell in chosen if cell.task not in failed]
     for cell in chosen:
         if cell.task in failed:
-            call.console.warn(f"{_words(cell, grid)} failed: {failed[cell.task]}")
+            call.console.warn(f"{_line(cell.told(grid))} failed: {failed[cell.task]}")
     if not made:
         raise next(iter(failed.values()))
     artefact = call.pipeline.make(grids.sweep(grid, made))
     _show_scores(artefact.content)
-    _draw(call, artefact, image, output, csv_)
+    picture = _drawn(call, artefact, image)
+    write_outputs(call.console, picture, output if picture else None, artefact.content, csv_)
+    if picture and output is None:
+        call.console.note(f"its figure: koop plot sweep {artefact.record.name} -o sweep.pdf")
     if as_json:
-        records = [call.pipeline.make(cell.task).record.name for cell in made]
+        records = [call.pipeline.found(cell.task) for cell in made]
         print_json(
             {
                 **describe(artefact, call.pipeline.store.path(artefact.record)),
                 "evaluations": [
-                    {"name": name, "settings": cell.told(grid)} for name, cell in zip(records, made, strict=True)
+                    {"name": record.name, "settings": cell.told(grid), "same": [words(grid, p) for p in cell.same]}
+                    for record, cell in zip(records, made, strict=True)
+                    if record is not None
                 ],
                 "refused": [{"settings": c.told(grid), "reason": c.refused} for c in every if c.refused],
                 "failed": [
@@ -142,18 +148,27 @@ def _shard(text: str | None) -> tuple[int, int] | None:
     return int(found[1]), int(found[2])
 
 
-def _say_refused(call: Invocation, grid: Grid, every: Sequence[Cell]) -> None:
+def _say_left_out(call: Invocation, grid: Grid, every: Sequence[Cell]) -> None:
+    """Which cells are not made: those that come to the same as others, and those that cannot work."""
+    from koopcli.stages.grid import words
+
+    same = [(words(grid, place), cell.told(grid)) for cell in every for place in cell.same]
+    if same:
+        call.console.note(
+            f"{len(same)} of {len(grid)} cells come to the same as others; the first, {_line(same[0][0])}, as "
+            f"{_line(same[0][1])}"
+        )
     refused = [cell for cell in every if cell.refused]
     if refused:
         first = refused[0]
         call.console.warn(
-            f"{len(refused)} of {len(every)} cells cannot work and are left out; the first, {_words(first, grid)}: "
+            f"{len(refused)} of {len(every)} cells cannot work and are left out; the first, {_line(first.told(grid))}: "
             f"{first.refused}"
         )
 
 
-def _words(cell: Cell, grid: Grid) -> str:
-    return " ".join(f"{name}={value}" for name, value in cell.told(grid).items())
+def _line(told: Mapping[str, str]) -> str:
+    return " ".join(f"{name}={value}" for name, value in told.items())
 
 
 def _make(call: Invocation, tasks: Sequence[Task]) -> dict[Task, KoopError]:
@@ -217,7 +232,9 @@ def _show_scores(table: Swept) -> None:
         row = [told.get(name, "–") for name in shown]
         row.append(f"{scores['functions'][0]:.0f}")
         if seeds:
-            row += [str(len(group)), *(_percent(f(scores["mean"])) for f in (np.nanmedian, np.nanmin, np.nanmax))]
+            known = scores["mean"][np.isfinite(scores["mean"])]
+            ends = [f(known) if len(known) else np.nan for f in (np.median, np.min, np.max)]
+            row += [str(len(group)), *map(_percent, ends)]
         else:
             row += [_percent(scores[name][0]) for name in ("mean", "std", "median", "max")]
         row.append(f"{scores['diverged'].sum():.0f}")
@@ -234,20 +251,17 @@ def _percent(value: float) -> str:
     return f"{value:.4g}" if math.isfinite(value) else "–"
 
 
-def _draw(call: Invocation, artefact: Artefact, image: ImageFormat, output: Any, csv: Any) -> None:
-    """The figure of a sweep, and the files that were asked for."""
+def _drawn(call: Invocation, artefact: Artefact, image: ImageFormat) -> bytes:
+    """The figure of a sweep; nothing, and why, where there is none to draw."""
     from koopcli.stages import drawn
 
-    name = artefact.record.name
     try:
-        task = drawn.figure("sweep", [call.pipeline.named(name)], image, call.experiment)
-        drawing = call.pipeline.make(task)
-    except InvalidValueError as error:  # where all diverged there is nothing to draw
+        task = drawn.figure("sweep", [call.pipeline.named(artefact.record.name)], image, call.experiment)
+        found: bytes = call.pipeline.make(task).content.image
+    except InvalidValueError as error:  # where all diverged
         call.console.warn(f"the figure is not drawn: {error}")
-        return
-    write_outputs(call.console, drawing.content.image, output, artefact.content, csv)
-    if output is None:
-        call.console.note(f"its figure: koop plot sweep {name} -o sweep.pdf")
+        return b""
+    return found
 
 
 def register(app: typer.Typer) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -63,9 +63,11 @@ def parse_grid(assignments: Sequence[str]) -> Grid:
             raise UsageError(f"--set {name} is given twice: write all its values into one, such as {name}=1,2,5:8")
         known.add(name)
         values = [value for word in split(raw) for value in _values(name, word)]
-        for i, value in enumerate(values):
-            if any(_same(value, other) for other in values[:i]):
+        there: set[str] = set()
+        for value in values:
+            if text_of(value) in there:
                 raise InvalidValueError(f"--set {text}: the value {text_of(value)} stands there twice")
+            there.add(text_of(value))
         if len(values) > 1:
             axes.append(GridAxis(name, tuple(values)))
         else:
@@ -97,7 +99,8 @@ def text_of(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float):
-        return f"{value:.12g}"
+        short = f"{value:.12g}"
+        return short if float(short) == value else repr(value)
     if isinstance(value, list):
         return f"[{', '.join(map(text_of, value))}]"
     return str(value)
@@ -111,7 +114,8 @@ def _values(name: str, word: str) -> list[Any]:
     if found is None:
         return [toml_value(word)]
     whole = all(part is None or re.fullmatch(r"[+-]?\d+", part) for part in found.groups())
-    start, stop, step = (float(part) if part else 1.0 for part in found.groups())
+    number: Callable[[str], Any] = int if whole else float
+    start, stop, step = (number(part) if part else 1 for part in found.groups())
     count = (stop - start) / step if step else math.inf
     if not 0 <= count < MOST:
         raise InvalidValueError(
@@ -119,8 +123,4 @@ def _values(name: str, word: str) -> list[Any]:
             f"such as {name}=1:12, of at most {MOST:,} values"
         )
     values = [start + i * step for i in range(math.floor(count + 1e-9) + 1)]
-    return [round(value) for value in values] if whole else [float(f"{value:.12g}") for value in values]
-
-
-def _same(one: object, other: object) -> bool:
-    return type(one) is type(other) and one == other
+    return values if whole else [float(f"{value:.12g}") for value in values]

@@ -61,10 +61,10 @@ def select(sources: Sequence[Source], settings: Plot) -> SweptErrors:
         for spot in at if place[axis] < 0 else at[[place[axis]]]:  # where it has no effect a curve is flat
             there.setdefault(float(spot), []).append(error)
     curves = [_curve(_label(table, kept, place), there) for place, there in groups.items()]
-    shown = [curve for curve in curves if np.isfinite(curve.middle).any()]
-    best = sorted(shown, key=lambda curve: float(np.nanmin(curve.middle)))[:MOST]
+    worth = {i: float(np.nanmin(c.middle)) for i, c in enumerate(curves) if np.isfinite(c.middle).any()}
+    best = sorted(sorted(worth, key=worth.__getitem__)[:MOST])
     seeds = max(len(errors) for there in groups.values() for errors in there.values())
-    return SweptErrors(table.names[axis], words, tuple(c for c in shown if c in best), len(curves) - len(best), seeds)
+    return SweptErrors(table.names[axis], words, tuple(curves[i] for i in best), len(curves) - len(best), seeds)
 
 
 def numbers(shown: SweptErrors) -> Mapping[str, Array]:
@@ -106,8 +106,8 @@ def _along(axes: Any, shown: SweptErrors) -> None:
     at = np.unique(np.concatenate([curve.at for curve in shown.curves]))
     if shown.words:
         axes.set_xticks(range(len(shown.words)), [plain(word) for word in shown.words])
-    elif at[0] > 0 and at[-1] > WIDE * at[0]:
-        axes.set_xscale("log")
+    elif at[0] >= 0 and at[-1] > WIDE * (least := at[at > 0][0]):
+        axes.set_xscale("symlog", linthresh=least) if at[0] == 0 else axes.set_xscale("log")
     elif (at == np.round(at)).all():
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
@@ -143,7 +143,7 @@ def _curve(label: str, there: Mapping[float, Sequence[float]]) -> Curve:
 
 
 def _label(table: Swept, kept: Sequence[int], place: Sequence[int]) -> str:
-    """The settings of a curve by the last of their names."""
-    return ", ".join(
-        f"{table.names[i].rpartition('.')[2]} {table.values[i][p]}" for i, p in zip(kept, place, strict=True) if p >= 0
-    )
+    """The settings of a curve by the last of their names, or by all of it where that is another's too."""
+    last = [name.rpartition(".")[2] for name in table.names]
+    names = [short if last.count(short) == 1 else name for short, name in zip(last, table.names, strict=True)]
+    return ", ".join(f"{names[i]} {table.values[i][p]}" for i, p in zip(kept, place, strict=True) if p >= 0)

@@ -24,6 +24,10 @@ class Pass(Protocol):
     def __call__(self, data: Transitions, span: slice, progress: Progress) -> Found:
         """What the samples of ``span`` give."""
 
+    @property
+    def bytes(self) -> float:
+        """About how many bytes a part gives."""
+
     def pack(self) -> Packed:
         """The pass for another process, with its ``kind``."""
 

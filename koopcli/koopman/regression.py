@@ -70,7 +70,7 @@ class Scaled:
     @classmethod
     def of(cls, normal: Normal, ridge: float = 0.0, free: Sequence[int] = ()) -> Scaled:
         """The scaled equations; ``ridge`` times the sum of squares of the coefficients is added, but for ``free``."""
-        scale = np.sqrt(np.diag(normal.gram))
+        scale = np.sqrt(np.maximum(np.diag(normal.gram), 0.0))  # rounding may leave a column that is nothing below it
         scale[scale == 0] = 1.0
         penalty = np.full(len(scale), ridge)
         penalty[list(free)] = 0.0

@@ -114,6 +114,12 @@ class Sum:
     of: Regressors
     by_moments: bool = False
 
+    @property
+    def bytes(self) -> float:
+        """Those of both sums."""
+        layout = self.of.layout
+        return 8.0 * layout.columns * (layout.columns + layout.functions)
+
     def __call__(self, data: Transitions, span: slice, progress: Progress) -> Found:
         """Both sums over the samples of ``span``, their number, and what the moments have lost of V Vᵀ."""
         layout = self.of.layout
@@ -146,6 +152,11 @@ class Triangle:
 
     of: Regressors
     scale: FloatArray
+
+    @property
+    def bytes(self) -> float:
+        """Those of a square."""
+        return 8.0 * (self.of.layout.columns + self.of.layout.functions) ** 2
 
     def __call__(self, data: Transitions, span: slice, progress: Progress) -> Found:
         """That R over the samples of ``span``."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -37,6 +38,8 @@ class Survey:
 @dataclass(frozen=True)
 class Look:
     """The pass of a survey."""
+
+    bytes: ClassVar[float] = 8e6  # of states, whose number is bounded
 
     def __call__(self, data: Transitions, span: slice, progress: Progress) -> Found:
         """States, corners and the triangle of a part of the samples."""

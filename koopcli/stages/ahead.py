@@ -12,14 +12,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from koopcli.errors import KoopError, StorageError
+from koopcli.errors import KoopError, LockTimeoutError, StorageError
 from koopcli.progress import Progress, silent
 from koopcli.stages.base import Task
+from koopcli.stages.chunks import check_version
 from koopcli.stages.pipeline import Pipeline
-from koopcli.stages.workers import WorkerDiedError, done
+from koopcli.stages.registry import STAGES
+from koopcli.stages.workers import WorkerDiedError
 from koopcli.store import Store
 
-FATAL = (StorageError, WorkerDiedError)  # the next task would fare no better
+FATAL = (StorageError, LockTimeoutError, WorkerDiedError)  # the next task would fare no better
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,7 @@ class Making:
 
     root: Path
     task: Task
+    version: int
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,7 @@ class Made:
 
 def make(making: Making) -> Made:
     """Make an artefact whose inputs are in the store."""
+    check_version(making.task.stage, making.version)
     heard = _Heard()
     pipeline = Pipeline(Store(making.root, heard.warn), heard)
     pipeline.make(making.task)
@@ -83,8 +87,8 @@ def _each(pipeline: Pipeline, missing: list[Task], failed: dict[Task, KoopError]
     while ready or running:
         while ready and len(running) < pipeline.workers.width:
             task = ready.popleft()
-            running[pipeline.workers.submit(make, Making(root, task))] = task
-        for future in done(running):
+            running[pipeline.workers.submit(make, Making(root, task, STAGES[task.stage].version))] = task
+        for future in pipeline.workers.done(running):
             task = running.pop(future)
             try:
                 made = pipeline.workers.result(future)

@@ -43,11 +43,11 @@ class Reporter(Protocol):
 class Chunks(Protocol):
     """Work in chunks, each committed as it is done; those already there are not computed again."""
 
-    def __call__(self, count: int, size: int, given: Packed | None = None) -> list[Packed]:
+    def __call__(self, count: int, size: int, given: Packed | None = None, each: float = 0.0) -> list[Packed]:
         """The results of the stage's ``chunk`` on consecutive slices of ``range(count)`` of length ``size``.
 
         A stage may ask several times, each time with something else that is ``given``: its chunks find it among their
-        inputs as "given".
+        inputs as "given". ``each``: about how many bytes one of them stores, where it is no part of the whole.
         """
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from koopcli.blocks import blocks
-from koopcli.errors import DamagedArtefactError
+from koopcli.errors import DamagedArtefactError, InvalidValueError
 from koopcli.progress import Progress, silent
 from koopcli.records import Packed
 from koopcli.stages.base import Inputs
@@ -19,6 +19,8 @@ from koopcli.stages.recorded import content_of
 from koopcli.stages.registry import STAGES
 from koopcli.stages.workers import Workers
 from koopcli.store import Store
+from koopcli.store.identity import data_digest
+from koopcli.store.parts import Parts
 
 FINE = 1000  # parts of a chunk that progress is told in
 
@@ -39,11 +41,13 @@ class Chunk:
     start: int = 0
     stop: int = 0
     given: int | None = None
+    version: int = 0
     at_hand: Inputs | None = None
     progress: Progress = silent
 
     def compute(self) -> Packed:
-        """What the stage makes of these rows."""
+        """What the stage makes of these rows. Raises ``InvalidValueError`` where this is another version of it."""
+        check_version(self.stage, self.version)
         inputs = self.at_hand
         if inputs is None:
             inputs = {role: _content(self.root, name) for role, name in self.inputs}
@@ -82,7 +86,7 @@ class ChunkedWork:
     begun: int = 0
     """How many parts earlier calls have numbered."""
 
-    def __call__(self, count: int, size: int, given: Packed | None = None) -> list[Packed]:
+    def __call__(self, count: int, size: int, given: Packed | None = None, each: float = 0.0) -> list[Packed]:
         """The packed results of all slices of ``range(count)``, in order; large ones stay on disk."""
         whole, first = self.whole, self.begun
         if given is not None:
@@ -95,9 +99,10 @@ class ChunkedWork:
         if len(chunks) == 1:
             return [chunks[0].compute()]
         parts = self.store.parts(whole.key)
-        self.store.require(2 * self.size - parts.size())  # the chunks, then the whole beside them
-        if given is not None and not parts.read([first - 1]):
-            parts.commit(first - 1, given)
+        chunked = max(self.size, each * len(chunks))
+        self.store.require(chunked + self.size - parts.size())  # the chunks, then the whole beside them
+        if given is not None:
+            _settle(parts, first - 1, given)
         found = parts.read([chunk.i for chunk in chunks])
         missing = [chunk for chunk in chunks if chunk.i not in found]
         if len(missing) < len(chunks):
@@ -123,6 +128,16 @@ class ChunkedWork:
         return replace(whole, i=i, start=rows.start, stop=rows.stop, progress=inside)
 
 
+def _settle(parts: Parts, number: int, given: Packed) -> None:
+    """Let what chunks are given lie there as part ``number``. What an interrupted command left is gone on with only if
+    it was given the same to the last bit: another machine's survey may choose other directions, as good as these.
+    """
+    there = parts.read([number]).get(number)
+    if there is None or data_digest(there) != data_digest(given):
+        parts.drop(number)
+        parts.commit(number, given)
+
+
 class _GoneError(Exception):
     """An input is no longer in the store, or no longer good."""
 
@@ -137,12 +152,28 @@ def _store_of(root: Path, thread: int) -> Store:
     return Store(root)
 
 
-@lru_cache(maxsize=4)
+def check_version(stage: str, version: int) -> None:
+    """Refuse a job that another koop has sent: a process may have been running since before an update."""
+    here = STAGES[stage].version if stage in STAGES else None
+    if here != version:
+        raise InvalidValueError(
+            f"a worker has another koopcli (version {here} of {stage}, {version} is asked for): begin the workers again"
+        )
+
+
 def _content(root: Path, name: str) -> Any:
-    """The verified content of an input, kept from one chunk to the next."""
+    """The verified content of an input, kept from one chunk to the next while its record stays as it is."""
+    record = _store(root).record(*name.split("/"))
+    if record is None:
+        raise _GoneError
+    return _content_of(root, name, record.object)
+
+
+@lru_cache(maxsize=4)
+def _content_of(root: Path, name: str, digest: str) -> Any:
     store = _store(root)
     record = store.record(*name.split("/"))
-    if record is None:
+    if record is None or record.object != digest:
         raise _GoneError
     try:
         return content_of(record, store)

@@ -40,6 +40,9 @@ class Engine(Protocol):
     def stop(self, executor: Executor, *, at_once: bool) -> None:
         """Stop it, ``at_once`` if what is begun is no longer wanted."""
 
+    def stalled(self) -> str | None:
+        """Why nothing may be done by now, and what to do, where that is so."""
+
     def died(self, error: BaseException) -> str | None:
         """What happened to a worker or to the engine where ``error`` says that one is gone, and what to do."""
 
@@ -57,6 +60,9 @@ class Here:
 
     def stop(self, executor: Executor, *, at_once: bool) -> None:
         """Nothing is running."""
+
+    def stalled(self) -> None:
+        """A job is done when it is begun."""
 
     def died(self, error: BaseException) -> None:
         """Then nobody would ask."""
@@ -106,6 +112,9 @@ class Processes:
             for process in multiprocessing.active_children():
                 process.terminate()
 
+    def stalled(self) -> None:
+        """The pool says what happened."""
+
     def died(self, error: BaseException) -> str | None:
         """A process that was ended from outside breaks the pool."""
         from concurrent.futures.process import BrokenProcessPool  # noqa: PLC0415
@@ -132,12 +141,8 @@ class Cluster:
 
     @property
     def width(self) -> int:
-        """Two jobs for each thread that the workers have, who may come and go."""
-        if self._client is not None and time.monotonic() > self._counted + COUNTED_EVERY:
-            self._counted = time.monotonic()
-            with suppress(OSError, RuntimeError):  # of a scheduler that is gone the jobs tell
-                self._threads = sum(self._client.nthreads().values())
-        return max(2, 2 * self._threads)
+        """Two jobs for each thread of the workers."""
+        return max(2, 2 * self._count())
 
     def start(self, store: Path) -> Executor:
         """The cluster's own executor. Raises ``InvalidValueError`` where it is not there or of no use here."""
@@ -147,7 +152,9 @@ class Cluster:
             raise InvalidValueError(
                 "--cluster needs Dask distributed, which is not installed: pip install 'koopcli[dask]'"
             ) from error
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in one line
+        for name in [*logging.root.manager.loggerDict, "asyncio", "tornado.application"]:
+            if name.startswith(("distributed", "asyncio", "tornado")):
+                logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what matters is said in one line
         client: Any = Client  # without types
         try:
             address = self._reached()
@@ -173,6 +180,12 @@ class Cluster:
         finally:
             client.close(timeout=ANSWERS_WITHIN)
 
+    def stalled(self) -> str | None:
+        """Where the last worker has left; others may come."""
+        if self._count() > 0:
+            return None
+        return f"the Dask cluster at {self.address} has no workers left: begin some, the work goes on with them"
+
     def died(self, error: BaseException) -> str | None:
         """Jobs whose workers died again and again, and those of a scheduler that is gone."""
         if type(error).__name__ == "KilledWorker":
@@ -180,6 +193,14 @@ class Cluster:
         if isinstance(error, CancelledError) or type(error).__name__ in ("CommClosedError", "FutureCancelledError"):
             return f"the Dask cluster at {self.address} is gone: begin it again"
         return None
+
+    def _count(self) -> int:
+        """How many threads the workers have, who may come and go."""
+        if self._client is not None and time.monotonic() > self._counted + COUNTED_EVERY:
+            self._counted = time.monotonic()
+            with suppress(OSError, RuntimeError):  # of a scheduler that is gone the jobs tell
+                self._threads = sum(self._client.nthreads().values())
+        return self._threads
 
     def _reached(self) -> str:
         """The address, itself or in the scheduler file, where something listens: a client that finds nothing is slow

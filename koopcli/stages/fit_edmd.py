@@ -36,7 +36,7 @@ def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
     data = Transitions.of([finished(inputs[role], context) for role in roles_of(inputs)])
 
     def over(work: Pass) -> Iterator[Found]:
-        yield from map(unpack_found, context.chunks(len(data), settings.chunk, work.pack()))
+        yield from map(unpack_found, context.chunks(len(data), settings.chunk, work.pack(), work.bytes))
 
     plain = settings.solver == "cholesky-monomials"
     seen = survey(data, over)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from koopcli.config.changes import nested
 from koopcli.config.experiment import Experiment, load_experiment
-from koopcli.config.grids import Grid, GridAxis, text_of
+from koopcli.config.grids import Grid, GridAxis
 from koopcli.config.samples import GridSample
 from koopcli.config.settings import Sweep, SweepAxis
 from koopcli.errors import InvalidValueError, UsageError
@@ -26,16 +26,23 @@ METHODS: dict[str, Callable[[Experiment], Task]] = {
 
 @dataclass(frozen=True)
 class Cell:
-    """One cell: its ``place`` on each axis, -1 where that has no effect, its evaluation, and why that is refused."""
+    """One cell: its ``place`` on each axis, -1 where that has no effect, its evaluation, and why that is refused.
+    ``same``: places that come to the same though every setting has an effect there.
+    """
 
     place: tuple[int, ...]
     task: Task
     refused: str = ""
+    same: tuple[tuple[int, ...], ...] = ()
 
     def told(self, grid: Grid) -> dict[str, str]:
         """Its settings, those that have an effect, in words."""
-        placed = zip(grid.axes, self.place, strict=True)
-        return {axis.name: axis.texts[i] for axis, i in placed if i >= 0}
+        return words(grid, self.place)
+
+
+def words(grid: Grid, place: Sequence[int]) -> dict[str, str]:
+    """The settings of a place, those that have an effect, in words."""
+    return {axis.name: axis.texts[i] for axis, i in zip(grid.axes, place, strict=True) if i >= 0}
 
 
 def cells(grid: Grid, method: str, base: str, check: Callable[[Task], None], progress: Progress = silent) -> list[Cell]:
@@ -62,6 +69,8 @@ def cells(grid: Grid, method: str, base: str, check: Callable[[Task], None], pro
                 refused = str(error)
                 reasons.append(error)
             found[task] = Cell(placed, task, refused)
+        elif placed != found[task].place:
+            found[task] = replace(found[task], same=(*found[task].same, placed))
         progress(count, len(grid))
     for name, reason in idle.items():
         if reason:
@@ -114,8 +123,3 @@ def order_grid(experiment: Experiment, **tested: object) -> Task:
 def _own(evaluation: Task) -> list[Task]:
     """What a cell makes for itself: what is behind its predictor is others' too."""
     return [evaluation, evaluation.input("predictor")]
-
-
-def in_words(told: dict[str, str]) -> str:
-    """Settings of a cell in one line."""
-    return " ".join(f"{name}={text_of(value)}" for name, value in told.items())

@@ -56,6 +56,7 @@ class Pipeline:
         self.store = store
         self.reporter = reporter
         self.workers = workers or Workers()
+        self.workers.warn = reporter.warn
         self._records: dict[Task, Record] = {}
         self.said: dict[str, str] = {}
         """What was said of each artefact, by name."""
@@ -214,7 +215,10 @@ class Pipeline:
         contents = {role: content for role, (_, content) in inputs.items()}
         lineage = {role: f"{record.stage}/{record.key}" for role, (record, _) in inputs.items()}
         with self.reporter.progress(stage.name) as progress:
-            whole = Chunk(self.store.root, task.stage, task.settings, key, tuple(lineage.items()), at_hand=contents)
+            inputs_by_name = tuple(lineage.items())
+            whole = Chunk(
+                self.store.root, task.stage, task.settings, key, inputs_by_name, version=stage.version, at_hand=contents
+            )
             chunks = ChunkedWork(self.store, whole, self.workers, progress, self.reporter.note, cost(task).bytes)
             packed = stage.run(task.settings, contents, Context(progress, self.reporter.warn, chunks)).pack()
         return self.store.commit(recipe, lineage, packed, provenance(time.perf_counter() - start))

@@ -6,15 +6,16 @@ Jobs and their results are small: what a job works on, and what it makes, lies i
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Self, TypeVar
 
 from koopcli.errors import InvalidValueError, UsageError
 from koopcli.stages.engines import Cluster, Engine, Here, Processes
 
+PATIENCE = 5.0  # seconds
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
@@ -31,6 +32,8 @@ class Workers:
         processes = Processes(count)
         self._engine: Engine = Cluster(cluster) if cluster is not None else Here() if count == 1 else processes
         self._executor: Executor | None = None
+        self.warn: Callable[[str], None] = lambda text: None
+        """Receives what a user should know while jobs are waited for."""
 
     @property
     def alone(self) -> bool:
@@ -87,8 +90,18 @@ class Workers:
             while waiting and len(running) < self.width:
                 job = waiting.pop()
                 running[self.submit(function, job)] = job
-            for future in done(running):
+            for future in self.done(running):
                 yield running.pop(future), self.result(future)
+
+    def done(self, running: Collection[Future[Result]]) -> set[Future[Result]]:
+        """Those of ``running`` that are done, once there are any; says so where nobody is left to do them."""
+        while True:
+            found = wait(running, PATIENCE, FIRST_COMPLETED).done
+            if found:
+                return found
+            stalled = self._engine.stalled()
+            if stalled is not None:
+                self.warn(stalled)
 
     @property
     def width(self) -> int:
@@ -98,11 +111,6 @@ class Workers:
     def _died(self, error: BaseException) -> WorkerDiedError | None:
         text = self._engine.died(error)
         return None if text is None else WorkerDiedError(f"{text}; what is done stays done")
-
-
-def done(running: dict[Future[Result], Any]) -> set[Future[Result]]:
-    """Those of ``running`` that are done, once there are any."""
-    return wait(running, return_when=FIRST_COMPLETED).done
 
 
 class WorkerDiedError(InvalidValueError):

@@ -49,6 +49,14 @@ class Parts:
         """Store chunk ``i``."""
         self._put(packed, lambda sha: self._folder / f"{i}-{sha}.h5")
 
+    def drop(self, first: int) -> None:
+        """Remove chunk ``first`` and all after it: they were made with something else."""
+        with storage_errors(self._folder):
+            for path in self._files():
+                match = CHUNK.fullmatch(path.name)
+                if match and int(match[1]) >= first:
+                    path.unlink(missing_ok=True)
+
     def clear(self) -> None:
         """Remove the chunks: the finished artefact holds them."""
         with suppress(OSError):

@@ -159,6 +159,25 @@ def test_other_methods_and_vehicles(koop):
     assert len(cells(told)) == 2
 
 
+def test_cells_that_come_to_the_same_are_said(koop, folder):
+    """A vehicle's tyres do not matter to forces: two names, one artefact."""
+    made = koop("sweep", "--set", "vehicle.name=ctu-2020,rimac-2018", "--set", "fit-edmd.order=1:2", "--json")
+    assert "2 of 4 cells come to the same as others; the first, vehicle.name=rimac-2018" in made.err
+    (same,) = {tuple(one["same"][0].values()) for one in json.loads(made.out)["evaluations"][:1]}
+    assert same == ("rimac-2018", "1")
+
+
+def test_scores_are_written_where_nothing_can_be_drawn(koop, folder):
+    """Predictions that all diverge have no error, and no figure."""
+    wild = ("--set", "test.box=[1e12,1e12,1e12]", "--set", "fit-edmd.order=3:4")
+    made = koop("sweep", *wild, "--csv", "sweep.csv", "-o", "sweep.png")
+    assert made.code == 0
+    assert "the figure is not drawn" in made.err
+    assert "RuntimeWarning" not in made.err
+    assert len((folder / "sweep.csv").read_text().splitlines()) == 3
+    assert not (folder / "sweep.png").exists()
+
+
 def test_a_dry_run_makes_nothing(koop, folder):
     planned = koop("sweep", *GRID, "--dry-run", "--json")
     said = json.loads(planned.out)

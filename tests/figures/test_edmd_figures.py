@@ -150,3 +150,52 @@ def test_random_input_takes_any_predictor(plant):
     )
     assert len(shown.predicted) == 4
     assert isinstance(data, Trajectories)
+
+
+def grid_of(names, values, places, mean):
+    from koopcli.koopman.swept import SCORES, Swept
+
+    mean = np.asarray(mean, dtype=float)
+    return Swept(tuple(names), tuple(map(tuple, values)), np.array(places), dict.fromkeys([*SCORES, "functions"], mean))
+
+
+def sweep_of(table):
+    from koopcli.figures import sweep
+    from koopcli.figures.drawing import Source
+
+    shown = sweep.select([Source("", None, {"sweep": table})], None)
+    assert sweep.numbers(shown)
+    return shown, sweep.draw(shown)
+
+
+def test_a_sweep_goes_along_its_longest_row_of_numbers_and_seeds_are_a_band():
+    places = [(i, j, k) for i in range(2) for j in range(3) for k in range(2)]
+    table = grid_of(
+        ["fit-edmd.terms", "fit-edmd.order", "sample.seed"],
+        [("linear", "bilinear"), ("1", "2", "3"), ("0", "1")],
+        places,
+        [10 * i + j + 0.5 * k for i, j, k in places],
+    )
+    shown, _ = sweep_of(table)
+    assert shown.name == "fit-edmd.order"
+    assert [curve.label for curve in shown.curves] == ["terms linear", "terms bilinear"]
+    assert shown.curves[1].middle.tolist() == [10.25, 11.25, 12.25]
+    assert shown.curves[1].low.tolist() == [10, 11, 12]
+    assert shown.seeds == 2
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "places"),
+    [
+        (["a.count", "b.count"], [("3", "4"), ("3", "4")], [(0, -1), (1, -1), (-1, 0), (-1, 1)]),  # one last name
+        (["fit-edmd.ridge"], [("0", "1e-6", "1e-2", "1")], [(0,), (1,), (2,), (3,)]),  # from nothing to far
+        (["sample.seed"], [("0", "1", "2")], [(0,), (1,), (2,)]),  # seeds alone
+        (["fit-edmd.basis"], [("tensor", "total")], [(0,), (1,)]),  # words alone
+        (["fit-edmd.order", "fit-edmd.ridge"], [("1", "2"), tuple(map(str, range(20)))],
+         [(i, j) for i in range(2) for j in range(20)]),
+    ],
+)  # fmt: skip
+def test_odd_sweeps_are_drawn(names, values, places):
+    shown, figure = sweep_of(grid_of(names, values, places, np.arange(1.0, len(places) + 1)))
+    assert len(shown.curves) <= 12
+    figure.draw_without_rendering()

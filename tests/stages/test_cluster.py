@@ -164,6 +164,24 @@ def test_a_cluster_that_goes_away_is_one_clear_error(tmp_path, cluster):
         vanish(workers)
 
 
+def test_what_is_said_of_a_cluster_that_goes_away_is_one_line(tmp_path, cluster):
+    """Dask's own logs and tracebacks stay off stderr."""
+    root = tmp_path / "store"
+    settings = (*DATA, "sample.count=40000", "fit-edmd.chunk=500")
+    words = [word for one in settings for word in ("--set", one)]
+    command = [sys.executable, "-m", "koopcli", "fit-edmd", *words, "--cluster", cluster.address, "--store", str(root)]
+    running = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env={**os.environ, **ALONE})
+    until(lambda: len(list(root.glob("partial/*/*"))) > 5)
+    cluster.end()
+    errors = running.communicate(timeout=PATIENCE)[1]
+    assert running.returncode == 3
+    lines = [
+        line for line in errors.splitlines() if not line.startswith(("store:", "sample/", "simulate/", "warning:"))
+    ]
+    assert len(lines) == 1, errors
+    assert "is gone: begin it again; what is done stays done" in lines[0]
+
+
 def test_a_cluster_without_workers_is_refused(tmp_path, cluster):
     for worker in cluster.workers:
         worker.kill()

@@ -7,6 +7,7 @@ import os
 import signal
 import time
 
+import numpy as np
 import pytest
 
 from koopcli.config.changes import parse_set
@@ -203,6 +204,60 @@ def test_damage_to_what_chunks_work_with_is_found(tmp_path, monkeypatch):
     assert made.object == whole.object
 
 
+@pytest.mark.parametrize("workers", [1, 2])
+def test_sums_that_were_given_other_directions_are_not_gone_on_with(tmp_path, monkeypatch, workers):
+    """Where another machine goes on, its inputs may be white in other directions, as good as these: nothing is mixed."""
+    task = recipes.fit_edmd(load_experiment("paper", parse_set(FIT)))
+    whole = Pipeline(Store(tmp_path / "whole"), Listener()).make(task)
+    store = Store(tmp_path / "broken")
+    Pipeline(store, Listener()).make(task.input("trajectories"))
+    real = np.linalg.svd
+    with monkeypatch.context() as patch:
+        patch.setattr(np.linalg, "svd", lambda *args, **told: turned(*real(*args, **told)))
+        break_off(store, task, 14, patch)
+    heard = Listener()
+    with Workers(workers) as sharing:
+        made = Pipeline(store, heard, sharing).make(task)
+    assert made.record.object == whole.record.object
+    assert [note for note in heard.notes if "already there" in note] == ["10 of 10 chunks were already there"]
+
+
+def turned(U, singular, Vt):
+    return -U, singular, -Vt
+
+
+def test_jobs_of_another_version_are_refused(tmp_path):
+    """A worker may have been running since before an update."""
+    from dataclasses import replace
+
+    from koopcli.stages import ahead, chunks
+
+    task = recipes.sample(load_experiment("paper", {}).sample("grid"))
+    with pytest.raises(InvalidValueError, match="begin the workers again"):
+        ahead.make(ahead.Making(tmp_path, task, version=99))
+    chunk = chunks.Chunk(tmp_path, "simulate", None, "0" * 64, (), version=STAGES["simulate"].version)
+    with pytest.raises(InvalidValueError, match=r"version \d+ of simulate, 99 is asked for"):
+        replace(chunk, version=99).compute()
+
+
+def test_waiting_for_nobody_is_said(monkeypatch):
+    from concurrent.futures import Future
+
+    from koopcli.stages import workers as module
+
+    monkeypatch.setattr(module, "PATIENCE", 0.01)
+    sharing, job, heard = Workers(), Future(), []
+
+    def warn(text):
+        heard.append(text)
+        job.set_result(1)
+
+    monkeypatch.setattr(type(sharing._engine), "stalled", lambda self: "nobody is left")
+    sharing.warn = warn
+    assert sharing.done([job]) == {job}
+    assert heard == ["nobody is left"]
+
+
 def test_without_locks_chunks_may_be_cleared_while_they_are_joined(tmp_path, alone, monkeypatch):
     """Another process finishes the artefact just before this one reads its chunks once more: its record wins."""
     from contextlib import nullcontext
@@ -247,7 +302,7 @@ def test_a_worker_whose_inputs_are_gone_leaves_its_chunk_to_the_command(tmp_path
     def collected(self, function, jobs, store_root):
         for path in (store.root / "records" / "sample").iterdir():
             path.unlink()
-        chunks._content.cache_clear()
+        chunks._content_of.cache_clear()
         return real(self, function, jobs, store_root)
 
     monkeypatch.setattr(Workers, "each", collected)

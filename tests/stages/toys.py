@@ -231,7 +231,7 @@ def _swept() -> Swept:
 
 
 def _chunks(stage, settings, inputs):
-    def chunks(count, size, given=None):
+    def chunks(count, size, given=None, each=0.0):
         rows = (slice(start, min(start + size, count)) for start in range(0, count, size))
         there = inputs if given is None else {**inputs, "given": given}
         return [STAGES[stage].chunk(settings, there, one, silent) for one in rows]
@@ -363,7 +363,9 @@ def results(stage: str) -> dict[str, list[float]]:
     found = {}
     for i, (settings, inputs) in enumerate(TOYS[stage]):
         made = STAGES[stage].run(settings, inputs, Context(silent, lambda text: None, _chunks(stage, settings, inputs)))
-        for name, array in made.pack().arrays.items():
+        packed = made.pack()
+        found |= {f"{i}: holds {name}": [1.0] for name in packed.meta}
+        for name, array in packed.arrays.items():
             if name != "image":
                 values = np.asarray(array.values, dtype=float).ravel()
                 weights = np.cos(np.arange(len(values)))
