@@ -169,7 +169,7 @@ def test_cells_that_come_to_the_same_are_said(koop, folder):
 
 def test_scores_are_written_where_nothing_can_be_drawn(koop, folder):
     """Predictions that all diverge have no error, and no figure."""
-    wild = ("--set", "test.box=[1e12,1e12,1e12]", "--set", "fit-edmd.order=3:4")
+    wild = ("--set", "sample.box=[0.01,0.01,0.01]", "--set", "test.box=[300,300,30]", "--set", "fit-edmd.order=3:4")
     made = koop("sweep", *wild, "--csv", "sweep.csv", "-o", "sweep.png")
     assert made.code == 0
     assert "the figure is not drawn" in made.err

@@ -127,7 +127,8 @@ def test_a_killed_worker_costs_no_more_than_its_chunk(tmp_path, cluster):
         time.sleep(0.01)
     errors = running.communicate()[1]
     assert running.returncode == 0, errors
-    assert {name: after[name] for name in before} == before
+    again = [name for name in before if after[name] != before[name]]
+    assert len(again) <= 1  # what it had just committed and not told yet
     numbers = [name.partition("-")[0] for name in after]
     assert len(set(numbers)) == len(numbers)  # no chunk came out twice
     assert Store(root).record("fit-edmd", alone.key).object == alone.object

@@ -206,7 +206,7 @@ def test_damage_to_what_chunks_work_with_is_found(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_sums_that_were_given_other_directions_are_not_gone_on_with(tmp_path, monkeypatch, workers):
-    """Where another machine goes on, its inputs may be white in other directions, as good as these: nothing is mixed."""
+    """Where another machine goes on, its directions of the inputs may be others, as good: nothing is mixed."""
     task = recipes.fit_edmd(load_experiment("paper", parse_set(FIT)))
     whole = Pipeline(Store(tmp_path / "whole"), Listener()).make(task)
     store = Store(tmp_path / "broken")
