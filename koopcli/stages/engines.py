@@ -175,9 +175,9 @@ class Cluster:
     def stop(self, executor: Executor, *, at_once: bool) -> None:
         """Leave the cluster. What is running there ends as it would; what waits is called off."""
         client, self._client = self._client, None
-        try:
+        with suppress(Exception):  # of a scheduler that is gone nothing is left to stop
             executor.shutdown(wait=not at_once)
-        finally:
+        with suppress(Exception):
             client.close(timeout=ANSWERS_WITHIN)
 
     def stalled(self) -> str | None:
