@@ -82,7 +82,6 @@ def sweep(
     check_outputs(output, csv_)
     call = begin(store, experiment, None, (), None, workers, cluster)
     from koopcli.stages import grid as grids
-    from koopcli.stages.grid import words
     from koopcli.stages.pipeline import cost
 
     with call.console.progress("cells") as progress:
@@ -120,7 +119,11 @@ def sweep(
             {
                 **describe(artefact, call.pipeline.store.path(artefact.record)),
                 "evaluations": [
-                    {"name": record.name, "settings": cell.told(grid), "same": [words(grid, p) for p in cell.same]}
+                    {
+                        "name": record.name,
+                        "settings": cell.told(grid),
+                        "same": [grids.words(grid, p) for p in cell.same],
+                    }
                     for record, cell in zip(records, made, strict=True)
                     if record is not None
                 ],
