@@ -36,6 +36,10 @@ class Packed:
     arrays: Mapping[str, Array]
     meta: Meta = field(default_factory=dict)
 
+    def below(self, prefix: str) -> dict[str, Array]:
+        """The arrays whose names begin with ``prefix``, without it."""
+        return {name.removeprefix(prefix): array for name, array in self.arrays.items() if name.startswith(prefix)}
+
 
 @dataclass(frozen=True)
 class Channels:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -181,14 +180,14 @@ class Predictor:
             couplings = arrays["couplings"].values[...]
             A = Modes(rates[:, 0] + 1j * rates[:, 1], couplings, meta["copies"], meta["dt"])
         found = cls(
-            observables=_unpack_lift(Packed(_below("lift/", arrays), meta["lift"]), A),
+            observables=_unpack_lift(Packed(packed.below("lift/"), meta["lift"]), A),
             A=A,
             B=arrays["B"].values[...],
             C=arrays["C"].values[...],
             N=arrays["N"].values[...] if "N" in arrays else None,
             generator=arrays["generator"].values[...] if "generator" in arrays else None,
             dt=meta["dt"],
-            coverage=Coverage.unpack(Packed(_below("coverage/", arrays))),
+            coverage=Coverage.unpack(Packed(packed.below("coverage/"))),
             state_channels=Channels.unpack(meta["state_channels"]),
             input_channels=Channels.unpack(meta["input_channels"]),
             rank=meta["rank"],
@@ -199,7 +198,7 @@ class Predictor:
             plant=meta["plant"],
             missed=meta["missed"],
             beyond=meta["beyond"],
-            trust=None if meta["trust"] is None else Trust.unpack(Packed(_below("trust/", arrays), meta["trust"])),
+            trust=None if meta["trust"] is None else Trust.unpack(Packed(packed.below("trust/"), meta["trust"])),
         )
         vars(found)["spectral_radius"] = meta["spectral_radius"]  # it costs as much as a small fit
         return found
@@ -239,7 +238,3 @@ def _unpack_lift(packed: Packed, A: FloatArray | Modes) -> Lift:
     """A table, which its modes carry on, or a basis."""
     kind = packed.meta["kind"]
     return TABLES[kind].unpack(packed, A) if isinstance(A, Modes) else STORED[kind](packed)
-
-
-def _below(prefix: str, arrays: Mapping[str, Array]) -> dict[str, Array]:
-    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}

@@ -102,8 +102,8 @@ class Regressors:
     @classmethod
     def unpack(cls, packed: Packed) -> Regressors:
         """The inverse of :meth:`pack`."""
-        basis = Packed(_below("basis/", packed), packed.meta["basis"])
-        inputs = WhiteInputs.unpack(Packed(_below("inputs/", packed)))
+        basis = Packed(packed.below("basis/"), packed.meta["basis"])
+        inputs = WhiteInputs.unpack(Packed(packed.below("inputs/")))
         return cls(STORED[basis.meta["kind"]](basis), inputs, packed.meta["bilinear"])
 
 
@@ -276,7 +276,3 @@ class _Gram:
 def _pairs(layout: Layout) -> list[tuple[int, int]]:
     """Which products of 1, w_1, w_2, … weigh the blocks of the Gram matrix."""
     return list(combinations_with_replacement(range(1 + layout.directions), 2)) if layout.bilinear else [(0, 0)]
-
-
-def _below(prefix: str, packed: Packed) -> dict[str, Array]:
-    return {n.removeprefix(prefix): array for n, array in packed.arrays.items() if n.startswith(prefix)}

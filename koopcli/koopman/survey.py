@@ -10,6 +10,7 @@ import numpy as np
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.coverage import corners_of, spread
 from koopcli.koopman.passes import Found, Over
+from koopcli.koopman.regression import add_rows
 from koopcli.koopman.transitions import Transitions
 from koopcli.progress import Progress
 from koopcli.records import FloatArray, Packed, Trajectories
@@ -80,7 +81,7 @@ def survey(data: Transitions, over: Over) -> Survey:
         corners = corners_of(np.concatenate([corners, part["corners"]]))
     triangle = found[0]["triangle"]
     for part in found[1:]:
-        triangle = np.asarray(np.linalg.qr(np.vstack([triangle, part["triangle"]]), mode="r"))
+        triangle = add_rows(triangle, part["triangle"])
     ends = _ends(*(part["ends"] for part in found))
     return Survey(np.concatenate([part["states"] for part in found]), corners, triangle, ends)
 
@@ -88,7 +89,7 @@ def survey(data: Transitions, over: Over) -> Survey:
 def add_inputs(triangle: FloatArray, u: FloatArray) -> FloatArray:
     """The R of [1, u] with more rows ``u`` (n, n_u)."""
     rows = np.hstack([np.ones((len(u), 1)), u])
-    return np.asarray(np.linalg.qr(np.vstack([triangle, rows]), mode="r"))
+    return add_rows(triangle, rows)
 
 
 def _ends(*inputs: FloatArray) -> FloatArray:
