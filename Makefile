@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 KOOP := $(BIN)/koop
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-edmd reproduce-eigen reproduce-beyond smoke test check docs pins bench peers scaling faults \
+.PHONY: help reproduce reproduce-edmd reproduce-eigen reproduce-beyond smoke test test-all check docs pins bench peers scaling faults \
   traps wheel clean
 
 help: ## Show this help
@@ -28,8 +28,11 @@ smoke: $(VENV)/.installed ## Run both methods on reduced datasets, in a store of
 	$(KOOP) reproduce all --smoke --store "$$store" && \
 	$(KOOP) reproduce all --smoke --store "$$store" 2>/dev/null
 
-test: $(VENV)/.developing ## Run the tests, on every core
+test: $(VENV)/.developing ## Run the tests, on every core (four minutes on two)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal
+
+test-all: $(VENV)/.developing ## Run the slow tests too
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal -m ''
 
 check: $(VENV)/.developing ## Lint, types and the direction of imports
 	$(BIN)/ruff format --check .

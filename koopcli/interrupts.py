@@ -22,7 +22,10 @@ AGAIN = 0.01  # seconds
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """For the time of a ``with``: SIGTERM raises ``SystemExit(143)``, and no interrupt is swallowed."""
+    """For the time of a ``with``: SIGTERM raises ``SystemExit(143)``, and no interrupt is swallowed.
+
+    A signal that this process was begun to ignore stays ignored.
+    """
     swallowed: list[BaseException] = []
     before_hook = sys.unraisablehook
 
@@ -41,6 +44,8 @@ def interruptible() -> Iterator[None]:
             before_hook(lost)
 
     handlers = {signal.SIGTERM: terminate, signal.SIGALRM: raise_again}
+    if signal.getsignal(signal.SIGTERM) == signal.SIG_IGN:  # as whoever began this process wants it
+        del handlers[signal.SIGTERM]
     before = {signum: signal.signal(signum, handler) for signum, handler in handlers.items()}
     sys.unraisablehook = hook
     try:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import signal
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +25,7 @@ from koopcli.store import Store
 from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
 from koopcli.vehicles.plants import Plant
 from koopcli.vehicles.single_track import ForceInput, SlipInput
+from tests import stock
 
 TINY = """
 [sample.grid]
@@ -70,6 +74,16 @@ class Result:
         return self.out.strip()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def signals() -> Iterator[None]:
+    """Signals as a terminal's shell hands them on, whatever this run was begun to ignore; child processes too."""
+    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+    before = {signum: signal.signal(signum, handler) for signum, handler in usual.items()}
+    yield
+    for signum, handler in before.items():
+        signal.signal(signum, handler)
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch) -> Path:
     """An empty working folder with an experiment `tiny.toml` beside it."""
@@ -94,6 +108,33 @@ def koop(folder, capsys):
         return Result(code, captured.out, captured.err)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def stocks(tmp_path_factory) -> Path:
+    """The folder of the stores that the tests of this run share, in whichever process they run."""
+    mine = tmp_path_factory.getbasetemp()
+    root = (mine.parent if "PYTEST_XDIST_WORKER" in os.environ else mine) / "stocks"
+    root.mkdir(exist_ok=True)
+    return root
+
+
+@pytest.fixture(scope="session")
+def reproduced(stocks) -> Path:
+    """A store with all that `koop reproduce` makes of the tiny experiment."""
+    return stock.obtain(stocks, TINY, "reproduced", [["reproduce"]])
+
+
+@pytest.fixture
+def stocked(folder, reproduced) -> None:
+    """The test's store begins with all that `koop reproduce` makes."""
+    stock.link(reproduced, folder / "artefacts")
+
+
+@pytest.fixture
+def undrawn(folder, reproduced) -> None:
+    """The test's store begins with all that `koop reproduce` makes, but for figures."""
+    stock.link(reproduced, folder / "artefacts", without=["plot"])
 
 
 @pytest.fixture

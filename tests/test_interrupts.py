@@ -53,3 +53,15 @@ def test_everything_is_as_before_afterwards():
     with interruptible():
         assert signal.getsignal(signal.SIGTERM) != before[0]
     assert (signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGALRM), sys.unraisablehook) == before
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_an_ignored_signal_stays_ignored(sent):
+    """As Unix wants it of a command that `nohup` or a shell's `&` began."""
+    before = signal.signal(sent, signal.SIG_IGN)
+    try:
+        with interruptible():
+            signal.raise_signal(sent)
+        assert signal.getsignal(sent) == signal.SIG_IGN
+    finally:
+        signal.signal(sent, before)

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import koopcli
+from tests import stock
 from tests.cli.test_errors import one_line
+from tests.conftest import TINY
 
 SMALL = ("--set", "sample.budget=25", "--experiment", "best-eigen")
 
@@ -154,7 +156,15 @@ def test_a_greedy_sample_depends_on_the_vehicle(koop):
     one_line(result, 2, "the plant 'slips' has no use for it")
 
 
-def test_beyond_in_one_command(koop, folder):
+@pytest.fixture
+def beyond(folder, stocks) -> None:
+    """The test's store begins with all that `koop reproduce eigen --beyond` makes."""
+    made = stock.obtain(stocks, TINY, "beyond", [["reproduce", "eigen", "--beyond"]])
+    stock.link(made, folder / "artefacts")
+
+
+@pytest.mark.slow  # 47 s of CPU for what `reproduce --beyond` makes
+def test_beyond_in_one_command(koop, folder, beyond):
     result = koop("reproduce", "eigen", "--beyond", "--json")
     assert result.code == 0, result.err
     found = json.loads(result.out)
@@ -176,14 +186,6 @@ def test_beyond_in_one_command(koop, folder):
     assert koop("reproduce", "eigen", "--beyond", "--dry-run").out.count(" make ") == 0  # all of it is there
 
 
-@pytest.mark.parametrize("figure", ["before-after", "modes", "frontier", "trust"])
-def test_the_figures_alone(koop, folder, figure):
-    result = koop("plot", figure, "-o", f"{figure}.png", "--csv", f"{figure}.csv")
-    assert result.code == 0, result.err
-    assert (folder / f"{figure}.png").stat().st_size > 10_000
-    assert len((folder / f"{figure}.csv").read_text().splitlines()) > 2
-
-
 def test_labels_of_ones_own(koop, folder):
     data = koop("simulate", "--plant", "slips").name
     both = [koop("evaluate", koop("fit-eigen", data, *more).name).name for more in ((), ("--lift", "linear"))]
@@ -194,7 +196,8 @@ def test_labels_of_ones_own(koop, folder):
     one_line(koop("plot", "error-map", both[0], "--label", "one"), 2, "--label changes nothing here")
 
 
-def test_the_commands_of_the_report_draw_its_pictures(koop):
+@pytest.mark.slow
+def test_the_commands_of_the_report_draw_its_pictures(koop, beyond):
     """Whatever a picture calls its artefacts, the command under it does too."""
     found = json.loads(koop("reproduce", "eigen", "--beyond", "--json").out)
     for one in found["figures"]:

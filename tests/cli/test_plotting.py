@@ -24,7 +24,7 @@ def inputs_of(koop, name):
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_a_figure_named_alone_makes_what_it_needs(koop, folder, name):
+def test_a_figure_named_alone_makes_what_it_needs(koop, folder, undrawn, name):
     done = koop("plot", name, "-o", "figure.png", "--csv", "figure.csv", "--json")
     assert done.code == 0, done.err
     facts = json.loads(done.out)
@@ -42,7 +42,7 @@ def test_a_figure_named_alone_makes_what_it_needs(koop, folder, name):
 
 
 @pytest.mark.parametrize("name", TAKING)
-def test_named_artefacts_are_the_same_figure(koop, name):
+def test_named_artefacts_are_the_same_figure(koop, stocked, name):
     alone = koop("plot", name)
     named = koop("plot", name, *inputs_of(koop, alone.name))
     assert named.code == 0, named.err
@@ -85,7 +85,7 @@ def test_a_dry_run_makes_nothing(koop, folder):
     assert not (folder / "artefacts").exists()
 
 
-def test_one_changed_assumption(koop):
+def test_one_changed_assumption(koop, stocked):
     for name, change in (
         ("tyre", "vehicle.mu_scale=0.5"),
         ("tyre", "reproduce.beside=[]"),

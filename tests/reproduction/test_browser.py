@@ -12,6 +12,7 @@ import time
 
 import pytest
 
+from tests import stock
 from tests.conftest import TINY
 from tests.reproduction.pages import Page
 
@@ -37,10 +38,11 @@ VIEW = "figure[data-figure=error-map] .view"
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory):
+def report(tmp_path_factory, reproduced):
     """A report on tiny data, its path and its JSON."""
     work = tmp_path_factory.mktemp("report")
-    (work / "tiny.toml").write_text(TINY.replace("seeds = [0, 1]", "seeds = [0]"))
+    (work / "tiny.toml").write_text(TINY)
+    stock.link(reproduced, work / "store")
     command = [sys.executable, "-m", "koopcli", "reproduce", "--experiment", "tiny.toml", "--json", "--store", "store"]
     done = subprocess.run(command, cwd=work, capture_output=True, text=True, check=True)
     found = json.loads(done.stdout)

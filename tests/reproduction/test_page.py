@@ -32,7 +32,7 @@ def undrawn(reason="every prediction diverged"):
     return Illustration("orders", "a caption", "here", "", None, None, (), reason)
 
 
-def test_the_report_of_both_methods(koop, folder):
+def test_the_report_of_both_methods(koop, folder, stocked):
     done = koop("reproduce", "--json")
     assert done.code == 0, done.err
     found = json.loads(done.out)
@@ -74,7 +74,7 @@ def test_the_report_of_both_methods(koop, folder):
     assert "made in" not in again.err
 
 
-def test_every_command_of_the_report_makes_its_figure(koop):
+def test_every_command_of_the_report_makes_its_figure(koop, stocked):
     found = json.loads(koop("reproduce", "edmd", "--set", "plot.restart=2", "--json").out)
     assert {one["run"] for one in found["figures"]} == {"here", "plot.restart=2"}
     commands = [one["command"] for one in found["figures"]]
@@ -89,7 +89,7 @@ def test_every_command_of_the_report_makes_its_figure(koop):
         assert (facts["name"], facts["cached"]) == (one["name"], True)
 
 
-def test_two_runs_share_what_does_not_change(koop):
+def test_two_runs_share_what_does_not_change(koop, stocked):
     found = json.loads(koop("reproduce", "edmd", "--set", "vehicle.Jzz=1731", "--json").out)
     sketches = [one for one in found["figures"] if one["figure"] == "single-track"]
     assert len(sketches) == 1
