@@ -12,7 +12,13 @@ from koopcli.figures.registry import FIGURES
 from koopcli.koopman import metrics
 from tests.cli.test_errors import one_line
 
-TAKING = {name: kind for name, kind in FIGURES.items() if kind.takes != "nothing"}
+LONG = ("frontier", "trajectory", "before-after", "trust", "modes")  # to make what they draw takes seconds
+TAKING = [name for name, kind in FIGURES.items() if kind.takes != "nothing"]
+
+
+def in_time(names, *long):
+    """The names of figures as parameters, of which the ``long`` ones are slow."""
+    return [pytest.param(name, marks=pytest.mark.slow) if name in long else name for name in names]
 
 
 def inputs_of(koop, name):
@@ -23,7 +29,7 @@ def inputs_of(koop, name):
     return [record["inputs"][f"{i}/{role}"] for i in range(sum(key.endswith(f"/{role}") for key in record["inputs"]))]
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("name", in_time(FIGURES, "frontier", "trajectory"))
 def test_a_figure_named_alone_makes_what_it_needs(koop, folder, undrawn, name):
     done = koop("plot", name, "-o", "figure.png", "--csv", "figure.csv", "--json")
     assert done.code == 0, done.err
@@ -41,7 +47,7 @@ def test_a_figure_named_alone_makes_what_it_needs(koop, folder, undrawn, name):
     assert (folder / "again.png").read_bytes() == (folder / "figure.png").read_bytes()
 
 
-@pytest.mark.parametrize("name", TAKING)
+@pytest.mark.parametrize("name", in_time(TAKING, *LONG))
 def test_named_artefacts_are_the_same_figure(koop, stocked, name):
     alone = koop("plot", name)
     named = koop("plot", name, *inputs_of(koop, alone.name))

@@ -44,6 +44,7 @@ def test_it_says_its_name_shows_a_table_and_draws(koop, folder):
     assert koop("plot", "sweep", made.name, "-o", "again.svg").code == 0
 
 
+@pytest.mark.slow
 def test_workers_make_the_same(koop, monkeypatch):
     alone = koop("sweep", *GRID, "--store", "alone", "--json")
     shared = koop("sweep", *GRID, "--store", "shared", "--workers", "2", "--json")
