@@ -14,6 +14,7 @@ from koopcli.stages.recorded import content_of, recipe_of, settings_of
 from koopcli.stages.registry import STAGES
 from koopcli.stages.workers import Workers
 from koopcli.store import Record, Store
+from koopcli.store.code import code_digest
 from koopcli.store.identity import key_of
 from koopcli.store.provenance import provenance
 from koopcli.store.records import SHORT
@@ -217,7 +218,7 @@ class Pipeline:
         with self.reporter.progress(stage.name) as progress:
             inputs_by_name = tuple(lineage.items())
             whole = Chunk(
-                self.store.root, task.stage, task.settings, key, inputs_by_name, version=stage.version, at_hand=contents
+                self.store.root, task.stage, task.settings, key, inputs_by_name, code=code_digest(), at_hand=contents
             )
             chunks = ChunkedWork(self.store, whole, self.workers, progress, self.reporter.note, cost(task).bytes)
             packed = stage.run(task.settings, contents, Context(progress, self.reporter.warn, chunks)).pack()
