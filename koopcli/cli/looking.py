@@ -34,7 +34,7 @@ def ls(
         typer.Option(
             "--stale",
             help="Only what this koop would not make again under the same name, and why: its stage, its settings or "
-            "what it was made from have changed. Apart from it, what other code made that would keep its name.",
+            "what it was made from have changed. Below it what other code made under a name that this koop gives too.",
         ),
     ] = False,
     store: StoreOption = None,

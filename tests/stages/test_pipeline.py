@@ -289,6 +289,18 @@ def test_records_hold_where_they_came_from(fresh):
     assert {"time", "host", "versions", "argv", "seconds", "peak_memory_mb", "git", "code"} <= set(record.provenance)
 
 
+def test_what_is_there_needs_no_digest_of_the_code(fresh, monkeypatch):
+    """And is found by other code under the same key."""
+    from koopcli.stages import pipeline
+    from koopcli.store import parts, provenance
+
+    task = recipes.fit_edmd(experiment())
+    fresh()[0].make(task)
+    for module in (pipeline, parts, provenance):
+        monkeypatch.delattr(module, "code_digest")
+    assert fresh()[0].make(task).cached
+
+
 def test_the_key_is_in_no_way_random(fresh, tmp_path):
     one = fresh()[0].make(recipes.sample(experiment().sample("grid"))).record
     two = Pipeline(Store(tmp_path / "elsewhere"), Listener()).make(recipes.sample(experiment().sample("grid"))).record
