@@ -24,7 +24,7 @@ SECTIONS = (
     "reproduce",
 )
 
-NUMBER = re.compile(r"(?<![\w.+-])[+-]?(?:\d{1,400}\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])")
+NUMBER = re.compile(r"(?<![\w.+-])[+-]?(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][+-]?\d++)?+(?![\w.])")
 
 Values = dict[str, Any]
 Changes = dict[str, Values]  # section -> setting -> raw value, or a table of them
@@ -69,12 +69,16 @@ def flat(changes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
 
 def toml_value(text: str) -> object:
     """``text`` as one TOML value, its numbers also as an option takes them (.5, 5., 007), or as it stands."""
-    for written in (text, NUMBER.sub(_toml_number, text)):
+    for written in (str, _with_toml_numbers):
         with suppress(ValueError, RecursionError):
-            parsed = tomllib.loads(f"value = {written}")
+            parsed = tomllib.loads(f"value = {written(text)}")
             if len(parsed) == 1:
                 return parsed["value"]
     return text.strip()
+
+
+def _with_toml_numbers(text: str) -> str:
+    return NUMBER.sub(_toml_number, text)
 
 
 def _toml_number(number: re.Match[str]) -> str:
