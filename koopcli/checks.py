@@ -99,12 +99,14 @@ def coerce(  # noqa: PLR0911  (one return for each kind of type reads best)
         (inner,) = [k for k in get_args(kind) if k is not type(None)]
         return coerce(inner, value, name, bounds, origin)
     if get_origin(kind) is tuple:
+        inner = get_args(kind)[0]
+        if isinstance(value, str) and get_origin(inner) is Literal:
+            value = (value,)  # one name, as an option gives it
         listed = isinstance(value, (list, tuple)) and (len(value) > 0 or bounds.get("empty"))
         if not listed or not isinstance(value, (list, tuple)):
             raise InvalidValueError(
                 origin.say(f"'{name}' must be a non-empty list such as [1, 2], got {_short(repr(value))}")
             )
-        inner = get_args(kind)[0]
         values = tuple(coerce(inner, v, f"{name}[{i}]", bounds, origin) for i, v in enumerate(value))
         if bounds.get("unique") and len(set(values)) < len(values):
             raise InvalidValueError(origin.say(f"'{name}' names a value twice: {_short(repr(value))}"))

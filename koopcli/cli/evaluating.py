@@ -117,11 +117,17 @@ def evaluate(
 def _judge(call: Invocation, artefact: Artefact, others: dict[str, Task]) -> dict[str, Any]:
     """The scores of the ``others`` beside those of ``artefact``, with the verdict, as a table and as JSON."""
     from koopcli.stages.pipeline import Pipeline
-    from koopcli.stages.verdict import NAMES, verdict
+    from koopcli.stages.verdict import NAMES, fitted_to_test_data, verdict
 
+    about = {"fitted_to_test_data": fitted_to_test_data(artefact.record, call.pipeline.store)}
+    if about["fitted_to_test_data"]:
+        call.console.warn(
+            "the predictor was fitted to these test trajectories, so its scores say how well it fits, not how well it "
+            "predicts: test it on others, such as those of another seed"
+        )
     if not others:
         call.console.note("no baselines beside it: the data that this predictor was fitted to are no longer there")
-        return {}
+        return about
     quiet = Pipeline(call.pipeline.store, _Unwarned(call.console), call.pipeline.workers)
     names, figures = {}, {}
     for name, task in others.items():
@@ -136,7 +142,7 @@ def _judge(call: Invocation, artefact: Artefact, others: dict[str, Task]) -> dic
     found = verdict(artefact.figures, figures)
     (call.console.note if found.beats else call.console.warn)(found.text)
     scores = {name: {"name": names[name], "rmse": figures[name]["rmse"]} for name in others}
-    return {"baselines": scores, "beats_baselines": found.beats, "verdict": found.text}
+    return {**about, "baselines": scores, "beats_baselines": found.beats, "verdict": found.text}
 
 
 def _scores(figures: dict[str, Any]) -> list[str]:

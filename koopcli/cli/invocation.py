@@ -57,6 +57,13 @@ class Invocation:
         content = self.pipeline.make(predictor).content
         return remembered_simulation(content.plant, content.dt)
 
+    def say_what_vehicle(self, tasks: Sequence[Task]) -> None:
+        """Note where the vehicle that was named makes the same as another would."""
+        from koopcli.stages.vehicle import makes_the_same
+
+        if said := makes_the_same(self.experiment, tasks):
+            self.console.note(said)
+
     def run(
         self,
         task: Task,
@@ -77,6 +84,7 @@ class Invocation:
         for name, _ in flat(self.changes):
             if idle := why_idle(name, self.experiment, [task], reads):
                 raise UsageError(f"{name} changes nothing here: {idle}")
+        self.say_what_vehicle([task])
         if dry_run:
             steps = {step.task: step for one in (task, *also) for step in self.pipeline.plan(one)}
             show_plan(list(steps.values()), as_json=as_json)

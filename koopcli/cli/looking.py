@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -34,7 +34,7 @@ def ls(
         typer.Option(
             "--stale",
             help="Only what this koop would not make again under the same name, and why: its stage, its settings or "
-            "what it was made from have changed.",
+            "what it was made from have changed. Below it what other code made under a name that this koop gives too.",
         ),
     ] = False,
     store: StoreOption = None,
@@ -45,18 +45,15 @@ def ls(
     Example: koop ls evaluate --stale
     """
     from koopcli.stages.registry import STAGES
-    from koopcli.store.files import printable, size_text
     from koopcli.store.pins import pins
 
     if stage is not None and stage not in STAGES:
         raise UnknownNameError(f"unknown stage '{stage}' (known: {', '.join(STAGES)})")
     console, shelf = open_store(store)
     records = _records(shelf, None if stale else stage, console)
-    why = {}
+    why: dict[str, tuple[str, bool]] = {}
     if stale:
-        from koopcli.stages import stale as staleness
-
-        why = staleness.stale({f"{record.stage}/{record.key}": record for record in records})
+        why = _why_stale(records)
         records = [
             record for record in records if f"{record.stage}/{record.key}" in why and stage in (None, record.stage)
         ]
@@ -73,7 +70,7 @@ def ls(
             "object": shelf.has_object(record),
             "pins": labels.get(f"{record.stage}/{record.key}", []),
             "settings": record.recipe["settings"],
-            **({"why": why[f"{record.stage}/{record.key}"]} if stale else {}),
+            **(dict(zip(("why", "keeps_name"), why[f"{record.stage}/{record.key}"], strict=True)) if stale else {}),
         }
         for record in records
     ]
@@ -81,21 +78,39 @@ def ls(
         print_json(rows)
         return
     console.note(f"store: {shelf.root}")
+    _list([row for row in rows if not row.get("keeps_name")], "why stale" if stale else "")
+    if kept := [row for row in rows if row.get("keeps_name")]:
+        _list(kept, "of other code", "made by other code, under the name that this koop gives it too")
+
+
+def _why_stale(records: Sequence[Record]) -> dict[str, tuple[str, bool]]:
+    """Full name -> why an artefact is stale, and whether it would keep its name; ``records``: all of a store."""
+    from koopcli.stages import stale as staleness
+
+    by_name = {f"{record.stage}/{record.key}": record for record in records}
+    found = {name: (said, True) for name, one in by_name.items() if (said := staleness.other_code(one)) is not None}
+    return found | {name: (said, False) for name, said in staleness.stale(by_name).items()}
+
+
+def _list(rows: Sequence[dict[str, Any]], why: str, title: str = "") -> None:
+    """The table of artefacts, with why they are listed where that has a heading."""
+    from koopcli.store.files import printable, size_text
+
     table = [
         [
             row["name"],
             row["made"].replace("T", " ")[:16],
             " ".join(row["pins"]),
             brief(row["settings"]),
-            *([row["why"]] if stale else []),
+            *([row["why"]] if why else []),
             f"{row['seconds']:.1f} s",
             size_text(row["bytes"]) if row["object"] else "missing",
         ]
         for row in rows
     ]
     table = [[printable(cell) for cell in row] for row in table]
-    header = ["artefact", "made (UTC)", "pinned as", "settings", *(["why stale"] if stale else []), "took", "size"]
-    show_table(header, table, left=len(header) - 2)
+    header = ["artefact", "made (UTC)", "pinned as", "settings", *([why] if why else []), "took", "size"]
+    show_table(header, table, title=title, left=len(header) - 2)
 
 
 def show(

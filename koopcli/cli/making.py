@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from koopcli.stages.base import Task
     from koopcli.stages.pipeline import Artefact
 
-SAMPLE = ("sample", "vehicle")
+SAMPLE = ("sample", "vehicle", "simulate")  # samples that simulate, or steer, take the period from the simulation
 SIMULATE = fitting.DATA
 
 

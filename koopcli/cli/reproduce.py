@@ -100,6 +100,7 @@ def reproduce(
     _refuse(call, chosen)
     runs = {one.name: _runs(call, base, one) for one in chosen}
     wanted = {one.name: [task for run in runs[one.name] for task in report.tasks(one, run)] for one in chosen}
+    call.say_what_vehicle([task for tasks in wanted.values() for task in tasks])
     if dry_run:
         steps = {step.task: step for tasks in wanted.values() for task in tasks for step in call.pipeline.plan(task)}
         show_plan(list(steps.values()), as_json=as_json)

@@ -6,6 +6,7 @@ import math
 import re
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -21,6 +22,8 @@ from koopcli.cli.options import (
     WorkersOption,
 )
 from koopcli.cli.outputs import OutputOption, check_outputs, image_format, write_outputs
+from koopcli.config.changes import nested
+from koopcli.config.experiment import load_experiment
 from koopcli.config.grids import Grid, parse_grid
 from koopcli.console import show_table
 from koopcli.errors import InvalidValueError, KoopError, UsageError
@@ -93,6 +96,7 @@ def sweep(
         chosen = grids.shared_out(chosen, n, lambda task: cost(task).seconds)[i - 1]
         if not chosen:
             raise InvalidValueError(f"--shard {i}/{n} has nothing to do: there are fewer than {n} cells")
+    _say_what_vehicle(call, grid, experiment, chosen)
     if dry_run:
         _show_plan(call, [cell.task for cell in chosen], as_json=as_json)
         return
@@ -168,6 +172,13 @@ def _say_left_out(call: Invocation, grid: Grid, every: Sequence[Cell]) -> None:
             f"{len(refused)} of {len(every)} cells cannot work and are left out; the first, {_line(first.told(grid))}: "
             f"{first.refused}"
         )
+
+
+def _say_what_vehicle(call: Invocation, grid: Grid, base: str, chosen: Sequence[Cell]) -> None:
+    """Of a vehicle that all cells have; where several are swept, cells that come to the same are said."""
+    if "vehicle.name" in dict(grid.fixed):
+        experiment = load_experiment(base, nested(grid.fixed))
+        replace(call, experiment=experiment).say_what_vehicle([cell.task for cell in chosen])
 
 
 def _line(told: Mapping[str, str]) -> str:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 from koopcli.checks import candidates
@@ -21,6 +23,8 @@ SECTIONS = (
     "plot",
     "reproduce",
 )
+
+NUMBER = re.compile(r"(?<![\w.+-])[+-]?(?:\d++(?:\.\d*+)?+|\.\d++)(?:[eE][+-]?\d++)?+(?![\w.])")
 
 Values = dict[str, Any]
 Changes = dict[str, Values]  # section -> setting -> raw value, or a table of them
@@ -64,9 +68,19 @@ def flat(changes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
 
 
 def toml_value(text: str) -> object:
-    """``text`` as one TOML value, or as it stands."""
-    try:
-        parsed = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):
-        return text.strip()
-    return parsed["value"] if len(parsed) == 1 else text.strip()
+    """``text`` as one TOML value, its numbers also as an option takes them (.5, 5., 007), or as it stands."""
+    for written in (str, _with_toml_numbers):
+        with suppress(ValueError, RecursionError):
+            parsed = tomllib.loads(f"value = {written(text)}")
+            if len(parsed) == 1:
+                return parsed["value"]
+    return text.strip()
+
+
+def _with_toml_numbers(text: str) -> str:
+    return NUMBER.sub(_toml_number, text)
+
+
+def _toml_number(number: re.Match[str]) -> str:
+    text = number[0]
+    return repr(int(text) if text.lstrip("+-").isdigit() else float(text))

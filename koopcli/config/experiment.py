@@ -56,6 +56,22 @@ class Experiment:
         named = [layer.values.get("vehicle", {}).get("name") for layer in self.layers]
         return Path(str(next((name for name in reversed(named) if name), DEFAULT_VEHICLE))).stem
 
+    def before_naming(self) -> Experiment | None:
+        """The experiment without the last name of a vehicle; None where there is none, or what is changed of the
+        vehicle needs it.
+        """
+        named = [i for i, layer in enumerate(self.layers) if "name" in layer.values.get("vehicle", {})]
+        if not named:
+            return None
+        layers = list(self.layers)
+        last = layers[named[-1]]
+        changed = {key: value for key, value in last.values["vehicle"].items() if key != "name"}
+        layers[named[-1]] = replace(last, values={**last.values, "vehicle": changed})
+        try:
+            return replace(self, layers=tuple(layers))._driving(_vehicle(layers))
+        except KoopError:
+            return None
+
     def with_vehicle(self, name: str) -> Experiment:
         """The experiment with a vehicle of ``reproduce.beside``, as its file has it but for what ``--set`` changes.
 

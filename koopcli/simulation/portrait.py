@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,9 +83,9 @@ def _substeps(p: VehicleParameters, speed: float, dt: float) -> float:
     return float(substeps(plant.fastest_rate(x, u, dt), dt)[0])
 
 
-def remarks(p: VehicleParameters) -> Iterator[str]:
-    """What is allowed but unusual, in words."""
-    values: dict[str, float | None] = {
+def measures(p: VehicleParameters) -> dict[str, float | None]:
+    """What road vehicles have in common, as far as it is known of this one: by name, as in ``USUAL``."""
+    return {
         "m": p.m,
         "wheelbase": p.l_f + p.l_r,
         "r_w": p.r_w,
@@ -93,11 +93,20 @@ def remarks(p: VehicleParameters) -> Iterator[str]:
         "Jzz over m l_f l_r": p.Jzz / (p.m * p.l_f * p.l_r),
         "peak grip": None if p.lateral is None else p.mu_scale * p.lateral.mu,
     }
+
+
+def odd(values: Mapping[str, float | None]) -> Iterator[str]:
+    """Which of the measures ``values`` no road vehicle has, in words."""
     for name, value in values.items():
         low, high, unit = USUAL[name]
         if value is not None and not low <= value <= high:
             shown = "" if unit == "1" else f" {unit}"
             yield f"{name} is {value:.4g}{shown}; road vehicles have {low:g} to {high:g}: is its unit right?"
+
+
+def remarks(p: VehicleParameters) -> Iterator[str]:
+    """What is allowed but unusual, in words."""
+    yield from odd(measures(p))
     if p.lateral is None or p.longitudinal is None:
         yield "no tyres: the tables [lateral] and [longitudinal] are for the plants 'slips' and 'wheels'"
     elif math.isfinite(critical := handling.critical_speed(p)):

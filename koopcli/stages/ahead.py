@@ -15,22 +15,21 @@ from pathlib import Path
 from koopcli.errors import KoopError, LockTimeoutError, StorageError
 from koopcli.progress import Progress, silent
 from koopcli.stages.base import Task
-from koopcli.stages.chunks import check_version
 from koopcli.stages.pipeline import Pipeline
-from koopcli.stages.registry import STAGES
-from koopcli.stages.workers import WorkerDiedError
+from koopcli.stages.workers import OtherCodeError, WorkerDiedError, check_code
 from koopcli.store import Store
+from koopcli.store.code import code_digest
 
-FATAL = (StorageError, LockTimeoutError, WorkerDiedError)  # the next task would fare no better
+FATAL = (StorageError, LockTimeoutError, WorkerDiedError, OtherCodeError)  # the next task would fare no better
 
 
 @dataclass(frozen=True)
 class Making:
-    """An artefact to make, small enough to be sent to another process."""
+    """An artefact to make, small enough to be sent to another process; ``code``: the digest of the code that asks."""
 
     root: Path
     task: Task
-    version: int
+    code: str
 
 
 @dataclass(frozen=True)
@@ -42,8 +41,8 @@ class Made:
 
 
 def make(making: Making) -> Made:
-    """Make an artefact whose inputs are in the store."""
-    check_version(making.task.stage, making.version)
+    """Make an artefact whose inputs are in the store. Raises ``OtherCodeError`` where other code has asked for it."""
+    check_code(making.code)
     heard = _Heard()
     pipeline = Pipeline(Store(making.root, heard.warn), heard)
     pipeline.make(making.task)
@@ -87,7 +86,7 @@ def _each(pipeline: Pipeline, missing: list[Task], failed: dict[Task, KoopError]
     while ready or running:
         while ready and len(running) < pipeline.workers.width:
             task = ready.popleft()
-            running[pipeline.workers.submit(make, Making(root, task, STAGES[task.stage].version))] = task
+            running[pipeline.workers.submit(make, Making(root, task, code_digest()))] = task
         for future in pipeline.workers.done(running):
             task = running.pop(future)
             try:

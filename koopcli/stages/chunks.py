@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from koopcli.blocks import blocks
-from koopcli.errors import DamagedArtefactError, InvalidValueError
+from koopcli.errors import DamagedArtefactError
 from koopcli.progress import Progress, silent
 from koopcli.records import Packed
 from koopcli.stages.base import Inputs
 from koopcli.stages.recorded import content_of
 from koopcli.stages.registry import STAGES
-from koopcli.stages.workers import Workers
+from koopcli.stages.workers import Workers, check_code
 from koopcli.store import Store
 from koopcli.store.identity import data_digest
 from koopcli.store.parts import Parts
@@ -29,7 +29,7 @@ FINE = 1000  # parts of a chunk that progress is told in
 class Chunk:
     """One chunk of one artefact. It names its inputs, by role, so that another process finds them in the store; where
     it runs in the process that has them it holds them, as ``at_hand``. ``start`` to ``stop`` are its rows; ``given``
-    is the number of the part that holds what else it works with.
+    is the number of the part that holds what else it works with; ``code`` is the digest of the code that asks for it.
     """
 
     root: Path
@@ -41,13 +41,13 @@ class Chunk:
     start: int = 0
     stop: int = 0
     given: int | None = None
-    version: int = 0
+    code: str = ""
     at_hand: Inputs | None = None
     progress: Progress = silent
 
     def compute(self) -> Packed:
-        """What the stage makes of these rows. Raises ``InvalidValueError`` where this is another version of it."""
-        check_version(self.stage, self.version)
+        """What the stage makes of these rows. Raises ``OtherCodeError`` where other code has sent them."""
+        check_code(self.code)
         inputs = self.at_hand
         if inputs is None:
             inputs = {role: _content(self.root, name) for role, name in self.inputs}
@@ -99,6 +99,8 @@ class ChunkedWork:
         if len(chunks) == 1:
             return [chunks[0].compute()]
         parts = self.store.parts(whole.key)
+        if others := parts.drop_others():
+            self.note(f"{others} chunks were made by other code of koopcli: they are dropped and made again")
         chunked = max(self.size, each * len(chunks))
         self.store.require(chunked + self.size - parts.size())  # the chunks, then the whole beside them
         if given is not None:
@@ -150,15 +152,6 @@ def _store(root: Path) -> Store:
 @lru_cache(maxsize=64)
 def _store_of(root: Path, thread: int) -> Store:
     return Store(root)
-
-
-def check_version(stage: str, version: int) -> None:
-    """Refuse a job that another koop has sent: a process may have been running since before an update."""
-    here = STAGES[stage].version if stage in STAGES else None
-    if here != version:
-        raise InvalidValueError(
-            f"a worker has another koopcli (version {here} of {stage}, {version} is asked for): begin the workers again"
-        )
 
 
 def _content(root: Path, name: str) -> Any:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from koopcli.config.driving import MAGNITUDES
 from koopcli.config.experiment import Experiment
 from koopcli.config.plants import UNUSED
-from koopcli.config.samples import OF_VEHICLE, SAMPLED_FOR
+from koopcli.config.samples import ELSEWHERE, OF_VEHICLE, SAMPLED_FOR
 from koopcli.stages.base import Task
 
 
@@ -23,6 +23,8 @@ def why_idle(name: str, experiment: Experiment, tasks: Sequence[Task], reads: Se
     if section in ("sample", "test"):
         return _idle_sample(section, key, tasks, behind)
     stages = {step.stage for step in behind}
+    if ELSEWHERE.get(key) == section and any(hasattr(step.settings, key) for step in behind if step.stage == "sample"):
+        return None
     if tasks and section != "vehicle" and section not in stages - {"plot"}:  # a figure reads what it is told of
         return _of_nothing(tasks)
     if section in ("vehicle", "simulate"):
@@ -58,6 +60,8 @@ def _idle_in_plants(name: str, key: str, tasks: Sequence[Task], behind: Sequence
     if not plants and not any(hasattr(one, name) for one in samples for name in own):
         if tasks and tasks[0].stage == "plot":
             return _of_nothing(tasks)
+        if key == "name":  # another vehicle may make the same, and that is said instead
+            return None
         return "only samples by kinetic energy depend on the vehicle, through its m and Jzz, and those on wheels (r_w)"
     unused = [plant for plant in plants if any(f"{name}.".startswith(f"{one}.") for one in UNUSED[plant])]
     return f"the plant '{unused[0]}' has no use for it" if plants and len(unused) == len(plants) else None

@@ -16,7 +16,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from koopcli import __version__
 from koopcli.errors import InvalidValueError
+from koopcli.store.code import SHORT, code_digest
 
 MOST = 256
 ANSWERS_WITHIN = 10  # seconds
@@ -128,8 +130,8 @@ class Processes:
 class Cluster:
     """A running Dask cluster by the ``address`` of its scheduler, or by the scheduler file (.json) that it wrote.
 
-    Its workers see the same store as this process, and have the same koopcli. One that is killed costs what it was
-    doing: the scheduler gives that to another.
+    Its workers see the same store as this process, and have the same code of koopcli. One that is killed costs what it
+    was doing: the scheduler gives that to another.
     """
 
     address: str
@@ -215,9 +217,7 @@ class Cluster:
         return address
 
     def _look(self, store: Path) -> None:
-        """Refuse workers of another koop, and those that do not see the store."""
-        from koopcli import __version__  # noqa: PLC0415
-
+        """Refuse workers of other code, and those that do not see the store."""
         try:
             found = self._client.run(_seen_from_here, str(store))
         except Exception as error:  # whatever a worker without koopcli makes of it
@@ -226,11 +226,11 @@ class Cluster:
             ) from error
         if not found:
             raise InvalidValueError(f"--cluster {self.address} has no workers: begin some with 'dask worker'")
-        for worker, (version, there) in found.items():
-            if version != __version__:
+        for worker, (code, there) in found.items():
+            if code != _code():
                 raise InvalidValueError(
-                    f"--cluster {self.address}: the worker {worker} has koopcli {version}, this is {__version__}: "
-                    "install one version everywhere"
+                    f"--cluster {self.address}: the worker {worker} has koopcli {code}, this is {_code()}: install one "
+                    "koopcli everywhere and begin the workers again"
                 )
             if not there:
                 raise InvalidValueError(
@@ -240,10 +240,13 @@ class Cluster:
 
 
 def _seen_from_here(store: str) -> tuple[str, bool]:
-    """On a worker: its version of koopcli, and whether it sees the folder ``store``."""
-    from koopcli import __version__  # noqa: PLC0415
+    """On a worker: its koopcli, and whether it sees the folder ``store``."""
+    return _code(), os.path.isdir(store)
 
-    return __version__, os.path.isdir(store)
+
+def _code() -> str:
+    """The koopcli of this process in words: its version, which edits leave as it is, and its code."""
+    return f"{__version__} with code {code_digest()[:SHORT]}"
 
 
 def _end_with_parent() -> None:

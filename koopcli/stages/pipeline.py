@@ -12,8 +12,10 @@ from koopcli.stages.base import Context, Cost, Reporter, Stage, Task
 from koopcli.stages.chunks import Chunk, ChunkedWork
 from koopcli.stages.recorded import content_of, recipe_of, settings_of
 from koopcli.stages.registry import STAGES
+from koopcli.stages.vehicle import doubts
 from koopcli.stages.workers import Workers
 from koopcli.store import Record, Store
+from koopcli.store.code import code_digest
 from koopcli.store.identity import key_of
 from koopcli.store.provenance import provenance
 from koopcli.store.records import SHORT
@@ -60,6 +62,7 @@ class Pipeline:
         self._records: dict[Task, Record] = {}
         self.said: dict[str, str] = {}
         """What was said of each artefact, by name."""
+        self._doubted: set[str] = set()
 
     def make(self, task: Task) -> Artefact:
         """The artefact of ``task``, from the store where possible; what is missing upstream is made first."""
@@ -107,10 +110,14 @@ class Pipeline:
         return list(found.values())
 
     def check(self, task: Task) -> None:
-        """Refuse a task that cannot work, without making anything."""
+        """Refuse a task that cannot work, and warn of an odd vehicle once, without making anything."""
         for step in task.upstream():
             if step.key is None:
                 STAGES[step.stage].check(step)
+            for text in doubts(step):
+                if text not in self._doubted:
+                    self._doubted.add(text)
+                    self.reporter.warn(text)
 
     def _task(self, record: Record, below: tuple[str, ...] = ()) -> Task:
         if record.key in below:
@@ -217,7 +224,7 @@ class Pipeline:
         with self.reporter.progress(stage.name) as progress:
             inputs_by_name = tuple(lineage.items())
             whole = Chunk(
-                self.store.root, task.stage, task.settings, key, inputs_by_name, version=stage.version, at_hand=contents
+                self.store.root, task.stage, task.settings, key, inputs_by_name, code=code_digest(), at_hand=contents
             )
             chunks = ChunkedWork(self.store, whole, self.workers, progress, self.reporter.note, cost(task).bytes)
             packed = stage.run(task.settings, contents, Context(progress, self.reporter.warn, chunks)).pack()

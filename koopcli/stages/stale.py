@@ -1,4 +1,4 @@
-"""Which artefacts today's koop would not make again under the same key, and why."""
+"""Which artefacts today's koop would not make again under the same key, and why; and which other code has made."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from koopcli.stages.base import Task
 from koopcli.stages.recorded import recipe_of, settings_of
 from koopcli.stages.registry import STAGES
 from koopcli.store import Record
+from koopcli.store.code import SHORT, code_digest
 from koopcli.store.identity import canonical, key_of, plain
 
 
@@ -19,6 +20,14 @@ def stale(records: Mapping[str, Record]) -> dict[str, str]:
     """full name -> why, of those among ``records`` (all of a store, by full name) that are stale."""
     judge = _Judge(records)
     return {full: why for full in records if (why := judge.why(full)) is not None}
+
+
+def other_code(record: Record) -> str | None:
+    """What is said of an artefact that other code made, whatever its key, or None."""
+    code = record.provenance.get("code")
+    if code == code_digest():
+        return None
+    return f"made by other code ({code[:SHORT]})" if isinstance(code, str) else "made by a koop that told no code"
 
 
 class _Judge:

@@ -11,7 +11,11 @@ from koopcli.config.settings import Baseline, FitEdmd
 from koopcli.records import Meta
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
+from koopcli.stages.fit_edmd import OF_ONE_RUN
+from koopcli.stages.lineage import lineage
+from koopcli.stages.makers import LIFTED
 from koopcli.stages.usable import roles_of
+from koopcli.store import Record, Store
 
 LINEAR = FitEdmd(basis="total", order=1)
 NAMES = {
@@ -39,6 +43,29 @@ def beside(experiment: Experiment, evaluation: Task) -> dict[str, Task]:
         for name, other in others.items()
         if (other.stage, other.settings) != (predictor.stage, predictor.settings)
     }
+
+
+def fitted_to_test_data(evaluation: Record, store: Store) -> bool:
+    """Whether a predictor was fitted to what it is tested on, by whatever name: the same data, or the beginning of
+    trajectories that one sample gives.
+    """
+    behind = {one.role: one for one in lineage(evaluation, store).inputs}
+    predictor, test = behind["predictor"], behind["trajectories"].record
+    if predictor.record is None or predictor.record.stage not in LIFTED:
+        return False
+    data = predictor.record.recipe["inputs"]
+    roles = roles_of(data)
+    if evaluation.recipe["inputs"]["trajectories"] in [data[role] for role in roles]:
+        return True
+    fitted = [one.record for one in predictor.inputs if one.role in roles and one.record is not None]
+    return test is not None and any(_begins(test, whole) for whole in fitted)
+
+
+def _begins(part: Record, whole: Record) -> bool:
+    """Whether trajectories are the first steps of others, or all of them."""
+    here, there = part.recipe["settings"], whole.recipe["settings"]
+    same = all(here.get(name) == value for name, value in there.items() if name not in OF_ONE_RUN)
+    return same and part.recipe["inputs"] == whole.recipe["inputs"] and here["steps"] <= there["steps"]
 
 
 @dataclass(frozen=True)

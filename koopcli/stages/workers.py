@@ -14,6 +14,7 @@ from typing import Self, TypeVar
 
 from koopcli.errors import InvalidValueError, UsageError
 from koopcli.stages.engines import Cluster, Engine, Here, Processes
+from koopcli.store.code import SHORT, code_digest
 
 PATIENCE = 5.0  # seconds
 Job = TypeVar("Job")
@@ -115,3 +116,16 @@ class Workers:
 
 class WorkerDiedError(InvalidValueError):
     """A worker was ended from outside: what it did would end the next one too."""
+
+
+class OtherCodeError(InvalidValueError):
+    """A worker has other code than the command, which would be mixed into what it makes."""
+
+
+def check_code(code: str) -> None:
+    """Refuse a job that other ``code`` has sent: a process may have been running since before an edit."""
+    if code != code_digest():
+        raise OtherCodeError(
+            f"a worker has other code of koopcli ({code_digest()[:SHORT]}) than this command ({code[:SHORT]}): install "
+            "one koopcli everywhere, begin the workers again and run the same command again"
+        )

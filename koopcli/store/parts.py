@@ -1,4 +1,4 @@
-"""Chunks of an unfinished artefact, each committed by itself and named by its number and digest."""
+"""Chunks of an unfinished artefact, each committed by itself: number, digest and the code that made it are its name."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from pathlib import Path
 
 from koopcli.records import Packed
 from koopcli.store import image
+from koopcli.store.code import code_digest
 from koopcli.store.files import Published, UntrustedFileError, open_regular, storage_errors
 
 HELD = 64 << 20  # bytes of the chunks of one artefact that are held in memory; others are read where they are needed
-CHUNK = re.compile(r"(\d+)-([0-9a-f]{64})\.h5")
+CHUNK = re.compile(r"(\d+)-([0-9a-f]{64})-([0-9a-f]{64})\.h5")
 Put = Callable[[Packed, Callable[[str], Path]], Published]
 """Write a record durably to the path found from the digest of its bytes."""
 
@@ -27,11 +28,11 @@ class Parts:
         self._room = HELD
 
     def read(self, numbers: Collection[int]) -> dict[int, Packed]:
-        """Those of the chunks ``numbers`` that are there, verified; a damaged one is removed."""
+        """Those of the chunks ``numbers`` that this code made, verified; a damaged one is removed."""
         found: dict[int, Packed] = {}
         with storage_errors(self._folder):
             for path in self._files():
-                match = CHUNK.fullmatch(path.name)
+                match = _own(path)
                 if match and int(match[1]) in numbers and int(match[1]) not in found:
                     packed = self._verified(path, match[2])
                     if packed is None:
@@ -47,7 +48,15 @@ class Parts:
 
     def commit(self, i: int, packed: Packed) -> None:
         """Store chunk ``i``."""
-        self._put(packed, lambda sha: self._folder / f"{i}-{sha}.h5")
+        self._put(packed, lambda sha: self._folder / f"{i}-{sha}-{code_digest()}.h5")
+
+    def drop_others(self) -> int:
+        """Remove the chunks of other code, and those that do not say whose they are; returns how many those were."""
+        with storage_errors(self._folder):
+            others = [path for path in self._files() if path.suffix == ".h5" and not _own(path)]
+            for path in others:
+                path.unlink(missing_ok=True)
+        return len(others)
 
     def drop(self, first: int) -> None:
         """Remove chunk ``first`` and all after it: they were made with something else."""
@@ -83,3 +92,9 @@ class Parts:
                 return image.from_bytes(file.read())
         except (FileNotFoundError, UntrustedFileError):
             return None
+
+
+def _own(path: Path) -> re.Match[str] | None:
+    """What the name of a chunk says, if this code made it."""
+    match = CHUNK.fullmatch(path.name)
+    return match if match and match[3] == code_digest() else None

@@ -13,11 +13,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from koopcli.store.code import code_digest
+
 PACKAGES = ("koopcli", "numpy", "scipy", "h5py", "matplotlib")
 
 
 def provenance(seconds: float) -> dict[str, Any]:
-    """Time, host, versions, git state, command line, seconds and the peak memory of the process so far."""
+    """Time, host, versions, code, git state, command line, seconds and the peak memory of the process so far."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # kB on Linux
     return {
         "time": datetime.now(UTC).isoformat(timespec="milliseconds"),
@@ -27,6 +29,7 @@ def provenance(seconds: float) -> dict[str, Any]:
         "blas_threads": os.environ.get("OPENBLAS_NUM_THREADS"),
         "python": platform.python_version(),
         "versions": _versions(),
+        "code": code_digest(),
         "git": _git(),
         "argv": [text.encode("utf-8", "backslashreplace").decode() for text in sys.argv],
         "seconds": round(seconds, 3),

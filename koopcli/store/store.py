@@ -1,6 +1,6 @@
 """The store: objects by digest, records by key. The record is the commit point.
 
-objects/ab/<sha256>.h5   records/<stage>/<key>.json   partial/<key>/<i>-<sha256>.h5
+objects/ab/<sha256>.h5   records/<stage>/<key>.json   partial/<key>/<i>-<sha256>-<code>.h5
 refs/ (pins)   locks/   tmp/   quarantine/
 """
 

@@ -112,6 +112,18 @@ def test_the_verdict_is_plain(koop):
     assert "warning: the predictor" not in driven.err
 
 
+def test_scores_on_what_was_fitted_are_called_so(koop):
+    """Each time, whether they are made or found."""
+    data = koop("simulate").name
+    for _ in range(2):
+        done = koop("evaluate", "--on", data[:14], "--json")
+        assert "warning: the predictor was fitted to these test trajectories" in done.err
+        assert json.loads(done.out)["fitted_to_test_data"] is True
+    usual = koop("evaluate", "--json")
+    assert "was fitted to these" not in usual.err
+    assert json.loads(usual.out)["fitted_to_test_data"] is False
+
+
 def test_predictions_that_restart(koop):
     """The paper's one trajectory, in stretches; the table has a row for each."""
     done = koop("evaluate", "--restart", "80", "--json")

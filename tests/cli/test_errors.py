@@ -79,7 +79,7 @@ def one_line(result, code, *parts):
         (["fit-eigen", "--set", "sample.kind=grid"], 3, "an eigenfunction e^(λt) g(x0) belongs to a system that runs"),
         (["fit-eigen", "--set", "sample.kind=box"], 3, "drives its trajectories with inputs that change"),
         (["baseline", "guess"], 2, "guess"),
-        (["sample", "grid", "--vehicle", "rimac-2018"], 2, "vehicle.name changes nothing here"),
+        (["sample", "grid", "--set", "simulate.dt=0.1"], 2, "simulate.dt changes nothing here"),
         (["fit-eigen", "--set", "sample.grid.count=3"], 2, "no sample of kind 'grid' is used"),
         (["fit-edmd", "--set", "sample.box.count=3"], 2, "no sample of kind 'box' is used"),
         (["sample", "ellipsoid", "--set", "sample.ball.seed=4"], 2, "no sample of kind 'ball' is used"),

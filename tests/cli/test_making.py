@@ -109,6 +109,16 @@ def test_any_setting_upstream_can_be_set(koop):
     assert shown["settings"]["predictor / trajectories / sample (sample)"]["seed"] == 3
 
 
+@pytest.mark.parametrize("command", [("sample", "grid"), ("fit-edmd",)])
+def test_naming_a_vehicle_is_never_refused(koop, command):
+    """Where it makes the same as another, that is said, and the other's artefact is found."""
+    first, *others = (koop(*command, "--vehicle", name, "--dry-run") for name in ("ctu-2020", "rimac-2018"))
+    for other in others:
+        assert (other.code, other.out) == (0, first.out)
+        assert "rimac-2018 and ctu-2020 differ only in lateral, longitudinal" in other.err
+    assert "differ only" not in first.err
+
+
 def test_three_lines_in_a_notebook(koop):
     name = koop("fit-edmd").name
     predictor = koopcli.load(name)

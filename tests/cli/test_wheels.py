@@ -70,6 +70,8 @@ def test_manoeuvres(koop, folder):
     one_line(koop("sample", "drive", "step-steer"), 2, "'sample.name' belongs to kind 'manoeuvre'")
     one_line(koop("sample", "manoeuvre", "--speed", "-3"), 3, "'sample.speed' must be above 0 m/s")
     one_line(koop("simulate", sample.name, "--dt", "0.02"), 3, "every 0.01 s", "--set simulate.dt=0.02")
+    slower = koop("sample", "manoeuvre", "--set", "simulate.dt=0.02")
+    assert koop("simulate", slower.name, "--dt", "0.02", "--dry-run").code == 0
     one_line(koop("simulate", sample.name, "--steps", "500"), 3, "400 steps")
 
 

@@ -7,7 +7,7 @@ from typing import get_args, get_type_hints
 import pytest
 
 from koopcli.config import driving, pictures, plants, sampled, samples, settings
-from koopcli.config.changes import SECTIONS, parse_set
+from koopcli.config.changes import SECTIONS, parse_set, toml_value
 from koopcli.config.data import data_folder
 from koopcli.config.experiment import load_experiment
 from koopcli.config.pictures import PlotOptions
@@ -184,6 +184,22 @@ def test_values_are_toml_or_plain_text():
         "vehicle": {"name": "x"},
     }
     assert parse_set(["vehicle.m=1\na=2"]) == {"vehicle": {"m": "1\na=2"}}  # one value, not two lines of TOML
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        (".5", 0.5),
+        ("-5.e1", -50.0),
+        ("007", 7),
+        ("[.5, 2.]", [0.5, 2.0]),
+        ("./2020.5", "./2020.5"),
+        ("car-2020.toml", "car-2020.toml"),
+        ('"a .5"', "a .5"),
+    ],
+)
+def test_numbers_are_also_read_as_options_take_them(text, value):
+    assert toml_value(text) == value
 
 
 @pytest.mark.parametrize("text", ["sample", "sample.seed", "seed=1", ".seed=1", "sample.=1", "planet.mass=1"])

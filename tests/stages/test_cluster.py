@@ -12,6 +12,7 @@ import time
 
 import pytest
 
+from koopcli import __version__
 from koopcli.config.changes import parse_set
 from koopcli.config.experiment import load_experiment
 from koopcli.errors import InvalidValueError, UsageError
@@ -216,15 +217,14 @@ def test_a_cluster_without_workers_is_refused(tmp_path, cluster):
     ("seen", "words"),
     [
         ({"tcp://w:1": ("0.0.0", True)}, "has koopcli 0.0.0"),
+        ({"tcp://w:1": (f"{__version__} with code 0123456789ab", True)}, "with code 0123456789ab, this is"),
         ({"tcp://w:1": (None, False)}, "does not see the store"),
     ],
 )
 def test_workers_that_are_of_no_use_are_refused(tmp_path, seen, words):
-    from koopcli import __version__
-
     class Client:
         def run(self, function, root):
-            return {name: (version or __version__, there) for name, (version, there) in seen.items()}
+            return {name: (code or engines._code(), there) for name, (code, there) in seen.items()}
 
     found = Cluster("tcp://w:0")
     found._client = Client()
@@ -233,10 +233,8 @@ def test_workers_that_are_of_no_use_are_refused(tmp_path, seen, words):
 
 
 def test_what_a_worker_sees(tmp_path):
-    from koopcli import __version__
-
-    assert engines._seen_from_here(str(tmp_path)) == (__version__, True)
-    assert engines._seen_from_here(str(tmp_path / "elsewhere")) == (__version__, False)
+    assert engines._seen_from_here(str(tmp_path)) == (engines._code(), True)
+    assert engines._seen_from_here(str(tmp_path / "elsewhere")) == (engines._code(), False)
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "", "there/is/none.json"])

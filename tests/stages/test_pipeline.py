@@ -286,7 +286,19 @@ def test_records_hold_where_they_came_from(fresh):
     record = fresh()[0].make(recipes.fit_edmd(experiment())).record
     assert record.lineage["trajectories"].startswith("simulate/")
     assert record.recipe["settings"].items() >= {"order": 2, "basis": "tensor"}.items()
-    assert {"time", "host", "versions", "argv", "seconds", "peak_memory_mb", "git"} <= set(record.provenance)
+    assert {"time", "host", "versions", "argv", "seconds", "peak_memory_mb", "git", "code"} <= set(record.provenance)
+
+
+def test_what_is_there_needs_no_digest_of_the_code(fresh, monkeypatch):
+    """And is found by other code under the same key."""
+    from koopcli.stages import pipeline
+    from koopcli.store import parts, provenance
+
+    task = recipes.fit_edmd(experiment())
+    fresh()[0].make(task)
+    for module in (pipeline, parts, provenance):
+        monkeypatch.delattr(module, "code_digest")
+    assert fresh()[0].make(task).cached
 
 
 def test_the_key_is_in_no_way_random(fresh, tmp_path):

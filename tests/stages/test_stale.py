@@ -50,6 +50,28 @@ def test_another_version_and_all_that_follows_from_it(koop, made, monkeypatch):
     assert "spectrum" not in table
 
 
+def test_what_other_code_made_is_listed_apart_from_what_has_another_name_here(koop, made, monkeypatch):
+    """An edit changes no key: what it would make is found under the name of what was made before it."""
+    monkeypatch.setattr(staleness, "code_digest", lambda: "9" * 64)
+    monkeypatch.setitem(STAGES, "fit-edmd", raised("fit-edmd"))
+    rows = json.loads(koop("ls", "--stale", "--json").out)
+    kept = {row["name"].partition("/")[0]: row["why"] for row in rows if row["keeps_name"]}
+    assert set(kept) == {"sample", "simulate"}
+    assert all(said.startswith("made by other code (") for said in kept.values())
+    first, _, second = koop("ls", "--stale").out.partition("made by other code, under the name")
+    assert "fit-edmd/" in first
+    assert "sample/" not in first
+    assert "sample/" in second
+    assert "fit-edmd/" not in second
+
+
+def test_artefacts_from_before_code_was_told_count_as_those_of_other_code(made):
+    record = Store(made).find("fit-edmd")
+    assert staleness.other_code(record) is None
+    old = replace(record, provenance={"time": record.provenance["time"]})
+    assert staleness.other_code(old) == "made by a koop that told no code"
+
+
 @dataclass(frozen=True)
 class Longer(FitEdmd):
     """The settings of tomorrow."""

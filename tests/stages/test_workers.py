@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import signal
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -226,18 +227,58 @@ def turned(U, singular, Vt):
     return -U, singular, -Vt
 
 
-def test_jobs_of_another_version_are_refused(tmp_path):
-    """A worker may have been running since before an update."""
-    from dataclasses import replace
-
+def test_jobs_of_other_code_are_refused(tmp_path):
+    """A worker may have been running since before an edit, which leaves every version as it is."""
     from koopcli.stages import ahead, chunks
 
     task = recipes.sample(load_experiment("paper", {}).sample("grid"))
     with pytest.raises(InvalidValueError, match="begin the workers again"):
-        ahead.make(ahead.Making(tmp_path, task, version=99))
-    chunk = chunks.Chunk(tmp_path, "simulate", None, "0" * 64, (), version=STAGES["simulate"].version)
-    with pytest.raises(InvalidValueError, match=r"version \d+ of simulate, 99 is asked for"):
-        replace(chunk, version=99).compute()
+        ahead.make(ahead.Making(tmp_path, task, "9" * 64))
+    with pytest.raises(InvalidValueError, match=r"other code of koopcli \(.{12}\) than this command \(9{12}\)"):
+        chunks.commit(chunks.Chunk(tmp_path, "simulate", None, "0" * 64, (), code="9" * 64))
+
+
+class Thread:
+    """An engine that costs no process."""
+
+    alone, width = False, 2
+
+    def start(self, store):
+        return ThreadPoolExecutor(1)
+
+    def stop(self, executor, *, at_once):
+        executor.shutdown()
+
+    def died(self, error):
+        return None
+
+
+def test_a_worker_of_other_code_ends_making_ahead(tmp_path, monkeypatch):
+    """It joined after the others had been looked at. The command does not go on as if that were one bad setting."""
+    from koopcli.stages import ahead
+
+    monkeypatch.setattr(ahead, "code_digest", lambda: "9" * 64)
+    task = recipes.sample(load_experiment("paper", {}).sample("grid"))
+    sharing = Workers()
+    sharing._engine = Thread()
+    with pytest.raises(InvalidValueError, match="other code"), sharing:
+        make_ahead(Pipeline(Store(tmp_path), Listener(), sharing), [task])
+
+
+def test_chunks_of_other_code_are_not_gone_on_with(tmp_path, alone, monkeypatch):
+    """Between an interruption and the next command koop was edited."""
+    from koopcli.store import parts
+
+    store = Store(tmp_path)
+    task = recipes.simulation(load_experiment("paper", parse_set(CHUNKED)))
+    with monkeypatch.context() as patch:
+        patch.setattr(parts, "code_digest", lambda: "9" * 64)
+        break_off(store, task, 3, patch)
+    heard = Listener()
+    made = Pipeline(store, heard).make(task)
+    assert "3 chunks were made by other code of koopcli: they are dropped and made again" in heard.notes
+    assert not [note for note in heard.notes if "already there" in note]
+    assert alone[made.record.name] == made.record.object
 
 
 def test_waiting_for_nobody_is_said(monkeypatch):

@@ -18,6 +18,8 @@ from koopcli.errors import (
 )
 from koopcli.records import Array, Packed
 from koopcli.store import Store, image
+from koopcli.store import parts as parts_module
+from koopcli.store.code import code_digest
 from koopcli.store.files import make_folder, publish, size_text, sweep
 from koopcli.store.identity import SCHEMA
 from koopcli.store.pins import pin, pins, unpin
@@ -237,10 +239,26 @@ def test_parts_are_verified_and_cleared(store):
     (path,) = (store.root / "partial").rglob("10-*.h5")
     path.write_bytes(path.read_bytes()[:-1])
     assert parts.read(range(20)).keys() == {0, 12}
-    os.mkfifo(path.parent / f"13-{'0' * 64}.h5")
+    os.mkfifo(path.parent / f"13-{'0' * 64}-{code_digest()}.h5")
     assert parts.read(range(20)).keys() == {0, 12}
     parts.clear()
     assert not (store.root / "partial" / ("k" * 64)).exists()
+
+
+def test_parts_of_other_code_are_never_read_and_are_dropped(store, monkeypatch):
+    """Nor are those of a koop that did not yet say in their names which code made them."""
+    parts = store.parts("k" * 64)
+    parts.commit(0, packed(1.0))
+    with monkeypatch.context() as patch:
+        patch.setattr(parts_module, "code_digest", lambda: "1" * 64)
+        parts.commit(0, packed(2.0))
+        parts.commit(1, packed(3.0))
+    (path,) = (store.root / "partial").rglob("1-*.h5")
+    path.rename(path.with_name(f"2-{path.name.split('-')[1]}.h5"))
+    assert {i: found.meta["value"] for i, found in parts.read(range(9)).items()} == {0: 1.0}
+    assert parts.drop_others() == 2
+    assert parts.drop_others() == 0
+    assert len(list((store.root / "partial").rglob("*.h5"))) == 1
 
 
 def test_chunks_of_a_finished_artefact_are_swept(store):
