@@ -43,8 +43,8 @@ def reference() -> str:
 def _settings() -> Iterator[str]:
     """Every setting that --set and an experiment file take, from the declarations themselves."""
     yield "## Settings\n"
-    yield "For `--set SECTION.KEY=VALUE` and for experiment files. Values are TOML; `--set` also takes numbers such as .5,"
-    yield "as options do, and one name for a list of names. `vehicle.name` chooses a vehicle.\n"
+    yield "For `--set SECTION.KEY=VALUE` and for experiment files. Values are TOML; `--set` also takes numbers such as"
+    yield ".5, as options do, and one name for a list of names. `vehicle.name` chooses a vehicle.\n"
     yield "`test.box`, `test.point`, `test.ball`, `test.drive-test` and `test.manoeuvre` take what samples of those"
     yield "kinds take; a setting without its kind, such as `sample.seed`, holds for the kind in use.\n"
     yield "| setting | default | allowed | meaning |\n|---|---|---|---|"
