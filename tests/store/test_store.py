@@ -20,8 +20,8 @@ from koopcli.records import Array, Packed
 from koopcli.store import Store, image
 from koopcli.store.files import make_folder, publish, size_text, sweep
 from koopcli.store.identity import SCHEMA
+from koopcli.store.names import store_root
 from koopcli.store.pins import pin, pins, unpin
-from koopcli.store.store import store_root
 
 
 def packed(value=1.0, n=4) -> Packed:
