@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from koopcli.errors import InvalidValueError, KoopError, StorageError
 from koopcli.interrupts import TERMINATED, interruptible
+from koopcli.streams import unstoppable
+from koopcli.text import one_line
 
 RESUME = "interrupted: nothing committed is lost; run the same command again to resume"
 INTERRUPTED = 130
@@ -16,13 +18,16 @@ BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
+    with unstoppable():
+        code = _answer(lambda: _run(argv))
+        return code or _answer(_flush)
+
+
+def _answer(work: Callable[[], int]) -> int:
+    """The exit code of ``work``, after one line for what went wrong."""
     try:
         with interruptible():
-            _streams()
-            for name in BLAS_THREADS:  # read when numpy is first imported, here and in workers
-                os.environ.setdefault(name, "1")
-            code = _run(argv)
-            sys.stdout.flush()
+            code = work()
     except KoopError as error:
         return _fail(str(error), error.exit_code)
     except MemoryError as error:
@@ -32,21 +37,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         code = INTERRUPTED
     except SystemExit as error:
-        code = TERMINATED if error.code == TERMINATED else 0  # typer's own exit: whoever read our output has left
-    except BrokenPipeError:
-        _discard_stdout()
-        return 0
+        code = error.code if isinstance(error.code, int) else 0  # SIGTERM; typer, after completing a command line
     except OSError as error:
         if error.filename is not None or error.errno is None:
             raise
-        _discard_stdout()
-        return _fail(f"cannot write the output: {error.strerror}", StorageError.exit_code)
+        return _fail(f"the operating system refused: {error.strerror}", StorageError.exit_code)
     if code in (INTERRUPTED, TERMINATED):
         _fail(RESUME, code)
     return code
 
 
 def _run(argv: Sequence[str] | None) -> int:
+    for name in BLAS_THREADS:  # read when numpy is first imported, here and in workers
+        os.environ.setdefault(name, "1")
     import typer  # noqa: PLC0415  (inside, so that Ctrl-C while it loads is answered too)
 
     from koopcli.cli.app import app  # noqa: PLC0415
@@ -57,27 +60,22 @@ def _run(argv: Sequence[str] | None) -> int:
         return INTERRUPTED
     except typer.TyperException as error:
         return _fail(error.format_message().replace("Value error, ", ""), getattr(error, "exit_code", 2))
+    except SystemExit as error:
+        broken = error.__context__
+        if error.code != TERMINATED and isinstance(broken, BrokenPipeError):  # which typer ends in silence
+            raise broken from None
+        raise
     return code if isinstance(code, int) else 0
 
 
-def _streams() -> None:
-    """Output that cannot fail for its encoding, nor for a stream that was closed before we began."""
-    for name in ("stdout", "stderr"):
-        stream = getattr(sys, name)
-        if stream is None:
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
-        elif hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")
-
-
-def _discard_stdout() -> None:
-    """Let the interpreter's last flush go nowhere."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def _flush() -> int:
+    sys.stdout.flush()
+    return 0
 
 
 def _fail(text: str, code: int) -> int:
     if text:
-        print(f"koop: {' '.join(text.split())}", file=sys.stderr)
+        print(f"koop: {one_line(text)}", file=sys.stderr)
     return code
 
 

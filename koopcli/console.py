@@ -1,4 +1,7 @@
-"""What the user sees besides results: notes, warnings, progress and one-line errors, all on stderr."""
+"""What the user sees: notes, warnings and progress on stderr, and lines and tables.
+
+Nothing of what is shown here steers a terminal, whoever wrote it.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,12 @@ from contextlib import contextmanager
 from typing import IO, TYPE_CHECKING
 
 from koopcli.progress import Progress, silent
+from koopcli.text import printable
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
+
+BETWEEN, LEAST = 3, 8  # letters between columns; and of a column, which is room for a size or a time
 
 
 class Console:
@@ -51,9 +57,9 @@ class Console:
 
     def _print(self, text: str) -> None:
         if self._bars is not None:
-            self._bars.console.print(text, markup=False, highlight=False, soft_wrap=True)
+            self._bars.console.print(printable(text), markup=False, highlight=False, emoji=False, soft_wrap=True)
         else:
-            print(text, file=sys.stderr, flush=True)
+            print(printable(text), file=sys.stderr, flush=True)
 
 
 def _bars() -> Bars:
@@ -65,25 +71,49 @@ def _bars() -> Bars:
     return RichProgress(*columns, TimeRemainingColumn(), console=RichConsole(stderr=True), transient=True)
 
 
+def show_line(text: str, file: IO[str] | None = None) -> None:
+    """A line of text on stdout or ``file``."""
+    print(printable(text), file=file or sys.stdout)
+
+
 def show_table(
     header: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = "", left: int = 1, file: IO[str] | None = None
 ) -> None:
     """A table of texts on stdout or ``file``, its first ``left`` columns flush left.
 
-    Off a terminal no row is folded or cut.
+    No row is ever folded. On a terminal the widest columns are cut to its width, but never the first, which has the
+    names; elsewhere nothing is cut.
     """
     from rich.box import SIMPLE  # noqa: PLC0415
+    from rich.cells import cell_len  # noqa: PLC0415
     from rich.console import Console as RichConsole  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
     target = file or sys.stdout
+    columns = [[printable(cell) for cell in column] for column in zip(header, *rows, strict=True)]
+    widths = [max(map(cell_len, column)) for column in columns]
+    between = BETWEEN * len(widths)
+    if target.isatty():
+        widths = cut_widths(widths, RichConsole(file=target).width - between)
     table = Table(box=SIMPLE, pad_edge=False)
-    for i, name in enumerate(header):
-        table.add_column(Text(name), justify="left" if i < left else "right", overflow="fold")
-    for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
-    console = RichConsole(file=target, width=None if target.isatty() else 400)
+    for i, (column, width) in enumerate(zip(columns, widths, strict=True)):
+        table.add_column(Text(column[0]), "left" if i < left else "right", width=width, no_wrap=True)
+    for cells in zip(*(column[1:] for column in columns), strict=True):
+        table.add_row(*map(Text, cells))
+    console = RichConsole(file=target, width=sum(widths) + between)
     if title:
-        console.print(Text(f"\n{title}", style="bold"))
+        console.print(Text(f"\n{printable(title)}", style="bold"), soft_wrap=True)
     console.print(table)
+
+
+def cut_widths(widths: Sequence[int], room: int) -> list[int]:
+    """Widths of columns in no more than ``room``: the widest are cut, to one width, the first never.
+
+    None is cut below ``LEAST``, for which a terminal may be too narrow.
+    """
+    first, *others = widths
+    most = max(others, default=0)
+    while most > LEAST and first + sum(min(width, most) for width in others) > room:
+        most -= 1
+    return [first, *(min(width, most) for width in others)]

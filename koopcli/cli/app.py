@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import koopcli
-from koopcli.cli import comparing, keeping, looking, making, plotting, reproduce, sweeping, vehicles
+from koopcli.cli import command, comparing, keeping, looking, making, plotting, reproduce, sweeping, vehicles
 
 app = typer.Typer(
     name="koop",
@@ -27,6 +27,7 @@ looking.register(app)
 comparing.register(app)
 keeping.register(app)
 vehicles.register(app)
+command.prepare(app)
 
 
 def _version(wanted: bool) -> None:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from koopcli.cli.completion import complete_name
 from koopcli.cli.invocation import open_store, print_json
-from koopcli.cli.options import JsonOption, StoreOption, complete_name
+from koopcli.cli.options import JsonOption, StoreOption
 from koopcli.console import Console, show_table
 from koopcli.errors import DamagedArtefactError, InvalidValueError
 
@@ -120,7 +121,7 @@ def _show(name_a: str, name_b: str, settings: Pairs, found: Comparison) -> None:
     for title, pairs in (("settings", settings), ("facts", found.facts)):
         if pairs:
             rows = [[name, _short(a), _short(b)] for name, (a, b) in pairs.items()]
-            _table([f"{title} that differ", f"A: {name_a}", f"B: {name_b}"], rows, left=3)
+            show_table([f"{title} that differ", f"A: {name_a}", f"B: {name_b}"], rows, left=3)
     rows = [
         [
             array.name,
@@ -131,13 +132,7 @@ def _show(name_a: str, name_b: str, settings: Pairs, found: Comparison) -> None:
         ]
         for array in found.arrays
     ]
-    _table(["array", "shape", "A | B", "largest", "relative", "beyond"], rows, left=3)
-
-
-def _table(header: list[str], rows: list[list[str]], left: int) -> None:
-    from koopcli.store.files import printable
-
-    show_table([printable(name) for name in header], [[printable(cell) for cell in row] for row in rows], left=left)
+    show_table(["array", "shape", "A | B", "largest", "relative", "beyond"], rows, left=3)
 
 
 def _what(found: Comparison) -> str:

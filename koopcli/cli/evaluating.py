@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from koopcli.cli import fitting
+from koopcli.cli.completion import complete_name
 from koopcli.cli.invocation import Invocation, begin
 from koopcli.cli.options import (
     ClusterOption,
@@ -18,7 +19,6 @@ from koopcli.cli.options import (
     SetOption,
     StoreOption,
     WorkersOption,
-    complete_name,
     names,
 )
 from koopcli.config.changes import Changes, Values
@@ -98,9 +98,9 @@ def evaluate(
     from koopcli.stages import recipes
     from koopcli.stages.verdict import beside
 
-    of = call.named(predictor, recipes.FITS, "the PREDICTOR", TEST) if predictor else None
+    of = call.optional(predictor, recipes.FITS, "the PREDICTOR", TEST)
     elsewhere = [section for section in call.changes if section != "test"]
-    test = call.named(on, ["simulate"], "--on", elsewhere) if on else None
+    test = call.optional(on, ["simulate"], "--on", elsewhere)
     if of is not None and test is None:
         test = recipes.test_set(call.experiment, call.simulated(of))
     task = recipes.evaluation(call.experiment, of, test)

@@ -6,6 +6,7 @@ from typing import Annotated, get_args
 
 import typer
 
+from koopcli.cli.completion import complete_name
 from koopcli.cli.invocation import begin
 from koopcli.cli.options import (
     ClusterOption,
@@ -16,7 +17,6 @@ from koopcli.cli.options import (
     StoreOption,
     VehicleOption,
     WorkersOption,
-    complete_name,
     names,
 )
 from koopcli.config.changes import Changes, Values
@@ -251,7 +251,7 @@ def fit_eigen(
     call = begin(store, experiment, set_, (*DATA, "fit-eigen"), {"fit-eigen": fit, "vehicle": {"name": vehicle}})
     from koopcli.stages import recipes
 
-    of = call.named(trajectories, ["simulate"], "the TRAJECTORIES", ("fit-eigen",)) if trajectories else None
+    of = call.optional(trajectories, ["simulate"], "the TRAJECTORIES", ("fit-eigen",))
     call.run(recipes.fit_eigen(call.experiment, of), as_json=as_json, dry_run=dry_run)
 
 
@@ -276,14 +276,14 @@ def baseline(
 ) -> None:
     """Make a prediction that fits nothing, to evaluate beside predictors: what any predictor has to beat.
 
-    Example: koop evaluate $(koop baseline rotation)
+    Example: koop evaluate "$(koop baseline rotation)"
     """
     call = begin(
         store, experiment, set_, (*DATA, "baseline"), {"baseline": {"kind": kind}, "vehicle": {"name": vehicle}}
     )
     from koopcli.stages import recipes
 
-    of = call.named(trajectories, ["simulate"], "the TRAJECTORIES", ("baseline",)) if trajectories else None
+    of = call.optional(trajectories, ["simulate"], "the TRAJECTORIES", ("baseline",))
     call.run(recipes.baseline(call.experiment, of), as_json=as_json, dry_run=dry_run)
 
 

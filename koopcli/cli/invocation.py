@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from koopcli.config.changes import Changes, flat, parse_set
 from koopcli.config.experiment import Experiment, load_experiment
 from koopcli.console import Console, show_table
 from koopcli.errors import UnknownNameError, UsageError
+from koopcli.text import printable
 
 if TYPE_CHECKING:
     from koopcli.config.settings import Simulate
@@ -46,6 +48,10 @@ class Invocation:
             raise UsageError(f"{text} is made already: {', '.join(fixed)} cannot change it; leave out one or the other")
         return task
 
+    def optional(self, text: str | None, kinds: Sequence[str], role: str, unaffected: Sequence[str]) -> Task | None:
+        """As :meth:`named`; None where the user named nothing, which an empty text is not."""
+        return None if text is None else self.named(text, kinds, role, unaffected)
+
     def simulated(self, predictor: Task) -> Simulate:
         """The simulation behind ``predictor``, which remembers it when its trajectories are gone."""
         from koopcli.stages.recipes import remembered_simulation
@@ -73,11 +79,12 @@ class Invocation:
         extra: Callable[[Artefact], Mapping[str, Any] | None] | None = None,
         reads: Sequence[str] = (),
         also: Sequence[Task] = (),
+        table_out: bool = False,
     ) -> None:
         """Make ``task`` and print its name, or print the plan.
 
         ``extra`` does the rest with the artefact and may return more for its JSON, ``also``: what it makes; ``reads``:
-        settings that matter beside those of the stages.
+        settings that matter beside those of the stages; ``table_out``: whether stdout has the table of the artefact.
         """
         from koopcli.stages.effects import why_idle
 
@@ -98,7 +105,14 @@ class Invocation:
         if as_json:
             print_json({**describe(artefact, self.pipeline.store.path(artefact.record)), **(more or {})})
         else:
-            print(artefact.record.name)
+            self.print_name(artefact.record.name, table_out=table_out)
+
+    def print_name(self, name: str, *, table_out: bool) -> None:
+        """Print the ``name`` of what was made, on stderr where stdout has its table."""
+        if table_out:
+            self.console.note(name)
+        else:
+            print(name)
 
 
 def begin(
@@ -151,16 +165,17 @@ def describe(artefact: Artefact, path: Path) -> dict[str, Any]:
 
 
 def print_json(value: object) -> None:
-    """One JSON value on stdout; what is not a finite number becomes null."""
-    print(json.dumps(_finite(value), indent=1, ensure_ascii=False))
+    """One JSON value on stdout; what is not a finite number becomes null, what would steer a terminal an escape."""
+    lines = json.dumps(_finite(value), indent=1, ensure_ascii=False).split("\n")
+    print("\n".join(line if line.isprintable() else "".join(map(_escaped, line)) for line in lines))
 
 
 def write_csv(content: Any, file: IO[str]) -> None:
-    """The table of an artefact's ``content``."""
+    """The table of an artefact's ``content``; on a terminal nothing of it steers that."""
     header, rows = content.table()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(rows)
+    for row in chain([header], rows):
+        writer.writerow([_shown(cell) for cell in row] if file.isatty() else row)
 
 
 def show_plan(steps: Sequence[Step], *, as_json: bool) -> None:
@@ -185,8 +200,17 @@ def show_plan(steps: Sequence[Step], *, as_json: bool) -> None:
 
 
 def brief(settings: dict[str, Any]) -> str:
-    """Settings in one short text, nested ones left out."""
-    return " ".join(f"{key}={value}" for key, value in settings.items() if not isinstance(value, (dict, list, tuple)))
+    """Settings in one short text, without nested ones, and without digests that nobody sets."""
+    plain = {key: value for key, value in settings.items() if not isinstance(value, (dict, list, tuple))}
+    return " ".join(f"{key}={value}" for key, value in plain.items() if key != "drawn_by")
+
+
+def _shown(cell: Any) -> Any:
+    return printable(cell) if isinstance(cell, str) else cell
+
+
+def _escaped(character: str) -> str:
+    return character if character.isprintable() else json.dumps(character)[1:-1]
 
 
 def _finite(value: Any) -> Any:

@@ -35,7 +35,7 @@ def verify(
     Example: koop verify --repair
     """
     from koopcli.stages.repair import opens, repair
-    from koopcli.store.files import printable, size_text
+    from koopcli.store.files import size_text
     from koopcli.store.verify import verify
 
     if fast and full:
@@ -58,7 +58,7 @@ def verify(
         if findings:
             table = [[f.kind, f.name, f.path, f.what, "yes" if f.repaired else ""] for f in findings]
             header = ["finding", "artefact", "file", "what", "repaired"]
-            show_table(header, [[printable(cell) for cell in row] for row in table], left=5)
+            show_table(header, table, left=5)
         read = "sizes only" if fast else f"{size_text(report.read)} read"
         mended = sum(one.repaired for one in findings)
         state = f"{len(left)} damaged" if left else "nothing is damaged"
@@ -89,7 +89,7 @@ def gc(
     Example: koop gc --grace 30 --delete
     """
     from koopcli.store.collect import plan, remove
-    from koopcli.store.files import DAY, printable, size_text
+    from koopcli.store.files import DAY, size_text
 
     if not (math.isfinite(grace) and grace >= 0):
         raise InvalidValueError(f"--grace must be a number of days of at least 0, got {grace:g}")
@@ -107,7 +107,7 @@ def gc(
         print_json({"remove": rows, "bytes": size, "kept": planned.kept, "deleted": delete})
         return
     if found:
-        table = [[printable(one.name), one.kind, size_text(one.size)] for one in found]
+        table = [[one.name, one.kind, size_text(one.size)] for one in found]
         show_table(["removed" if delete else "would remove", "kind", "frees"], table, left=2)
     done = "removed" if delete else "to remove"
     print(f"{done}: {len(found)} ({size_text(size)}); artefacts kept: {planned.kept}")

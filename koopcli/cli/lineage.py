@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
     from koopcli.stages.lineage import Ancestor
 
+UNCUT = 100_000  # letters of a line that is not for a terminal
+
 
 def show_lineage(name: str, store: Path | None, as_json: bool) -> None:
     """Print the artefact ``name`` and all behind it, from their records alone."""
@@ -29,7 +31,7 @@ def show_lineage(name: str, store: Path | None, as_json: bool) -> None:
 
     tree = Tree(_label(found))
     _grow(tree, found)
-    Console(file=sys.stdout, width=None if sys.stdout.isatty() else 400).print(tree)
+    Console(file=sys.stdout, width=None if sys.stdout.isatty() else UNCUT).print(tree)
 
 
 def _grow(tree: Tree, one: Ancestor) -> None:
@@ -40,7 +42,8 @@ def _grow(tree: Tree, one: Ancestor) -> None:
 def _label(one: Ancestor) -> Any:
     from rich.text import Text
 
-    from koopcli.store.files import printable, size_text
+    from koopcli.store.files import size_text
+    from koopcli.text import printable
 
     words = [_name(one)]
     if one.record is not None:
@@ -63,6 +66,6 @@ def _described(one: Ancestor) -> dict[str, Any]:
 
 
 def _name(one: Ancestor) -> str:
-    from koopcli.store.records import short_name
+    from koopcli.store.names import short_name
 
     return short_name(one.full)

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from koopcli.cli.completion import complete_name, complete_stage
 from koopcli.cli.invocation import brief, open_store, print_json, write_csv
 from koopcli.cli.lineage import show_lineage
-from koopcli.cli.options import JsonOption, StoreOption, complete_name
-from koopcli.console import Console, show_table
+from koopcli.cli.options import JsonOption, StoreOption
+from koopcli.console import Console, show_line, show_table
 from koopcli.errors import NewerFormatError, UnknownNameError, UsageError
 
 if TYPE_CHECKING:
@@ -28,7 +29,9 @@ NameArgument = Annotated[
 
 
 def ls(
-    stage: Annotated[str | None, typer.Argument(help="Only artefacts of this stage.")] = None,
+    stage: Annotated[
+        str | None, typer.Argument(autocompletion=complete_stage, help="Only artefacts of this stage.")
+    ] = None,
     stale: Annotated[
         bool,
         typer.Option(
@@ -94,7 +97,7 @@ def _why_stale(records: Sequence[Record]) -> dict[str, tuple[str, bool]]:
 
 def _list(rows: Sequence[dict[str, Any]], why: str, title: str = "") -> None:
     """The table of artefacts, with why they are listed where that has a heading."""
-    from koopcli.store.files import printable, size_text
+    from koopcli.store.files import size_text
 
     table = [
         [
@@ -108,7 +111,6 @@ def _list(rows: Sequence[dict[str, Any]], why: str, title: str = "") -> None:
         ]
         for row in rows
     ]
-    table = [[printable(cell) for cell in row] for row in table]
     header = ["artefact", "made (UTC)", "pinned as", "settings", *([why] if why else []), "took", "size"]
     show_table(header, table, title=title, left=len(header) - 2)
 
@@ -128,8 +130,8 @@ def show(
 
     Example: koop show evaluate/3f2a --csv > scores.csv
     """
-    from koopcli.store.files import printable
-
+    if as_csv and as_json:
+        raise UsageError("--csv and --json are two ways to print an artefact: choose one")
     if lineage:
         if as_csv:
             raise UsageError("--csv and --lineage are two ways to show an artefact: choose one")
@@ -158,15 +160,15 @@ def show(
         print_json(full)
         return
     for heading, facts in _sections(full):
-        print(printable(heading))
+        show_line(heading)
         for key, text in _rows(facts):
-            print(printable(f"  {key:<24} {text}"))
+            show_line(f"  {key:<24} {text}")
 
 
 def path(name: NameArgument, store: StoreOption = None) -> None:
     """Print where the HDF5 file of an artefact lies, after verifying it.
 
-    Example: h5dump -n $(koop path fit-edmd/3f2a)
+    Example: h5dump -n "$(koop path fit-edmd/3f2a)"
     """
     print(_obtain(name, store)[2])
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from koopcli.cli import evaluating, fitting
+from koopcli.cli.completion import complete_name
 from koopcli.cli.invocation import Invocation, begin
 from koopcli.cli.options import (
     ClusterOption,
@@ -19,7 +20,6 @@ from koopcli.cli.options import (
     StoreOption,
     VehicleOption,
     WorkersOption,
-    complete_name,
     names,
 )
 from koopcli.config.changes import Values
@@ -227,7 +227,7 @@ def simulate(
     call = begin(store, experiment, set_, SIMULATE, {"simulate": given, "vehicle": {"name": vehicle}}, workers, cluster)
     from koopcli.stages import recipes
 
-    of = call.named(sample, ["sample"], "the SAMPLE", ("simulate", "vehicle")) if sample else None
+    of = call.optional(sample, ["sample"], "the SAMPLE", ("simulate", "vehicle"))
     task = recipes.simulation(call.experiment, of)
     usual = [replace(task, settings=replace(task.settings, reference=False))] if task.settings.reference else []
     call.run(

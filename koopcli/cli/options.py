@@ -7,19 +7,12 @@ from typing import Annotated, Any, get_args
 
 import typer
 
+from koopcli.cli.completion import complete_experiment, complete_vehicle
+
 
 def names(literal: Any) -> str:
     """The allowed names of an option, as its placeholder in the help."""
     return "|".join(get_args(literal))
-
-
-def complete_name(incomplete: str) -> list[str]:
-    """Names of artefacts in the default store that begin with ``incomplete``, for shell completion."""
-    from koopcli.store import Store, store_root
-    from koopcli.store.records import SHORT
-
-    names = [f"{stage}/{key[:SHORT]}" for stage, key in Store(store_root()).index()]
-    return [name for name in names if name.startswith(incomplete)]
 
 
 StoreOption = Annotated[
@@ -55,9 +48,19 @@ ClusterOption = Annotated[
 ]
 ExperimentOption = Annotated[
     str,
-    typer.Option("--experiment", metavar="NAME|FILE", help="Where settings come from: paper, smoke or a TOML file."),
+    typer.Option(
+        "--experiment",
+        metavar="NAME|FILE",
+        autocompletion=complete_experiment,
+        help="Where settings come from: paper, smoke or a TOML file.",
+    ),
 ]
 VehicleOption = Annotated[
     str | None,
-    typer.Option("--vehicle", metavar="NAME|FILE", help="A shipped vehicle (ctu-2020) or your own TOML file."),
+    typer.Option(
+        "--vehicle",
+        metavar="NAME|FILE",
+        autocompletion=complete_vehicle,
+        help="A shipped vehicle (ctu-2020) or your own TOML file.",
+    ),
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from io import StringIO
 from pathlib import Path
 from typing import Annotated, Any, get_args
@@ -18,8 +19,10 @@ OutputOption = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write the image: .png, .svg or .pdf.")
 ]
 CsvOption = Annotated[
-    Path | None, typer.Option("--csv", metavar="FILE", help="Write the numbers that are drawn, as a table.")
+    Path | None,
+    typer.Option("--csv", metavar="FILE", help="Write the numbers that are drawn, as a table; - writes it to stdout."),
 ]
+STDOUT = Path("-")
 
 
 def image_format(output: Path | None) -> ImageFormat:
@@ -33,11 +36,13 @@ def image_format(output: Path | None) -> ImageFormat:
     raise InvalidValueError(f"{output}: unknown ending; write to a file ending in .{', .'.join(get_args(ImageFormat))}")
 
 
-def check_outputs(output: Path | None, csv: Path | None) -> None:
-    """Refuse files that cannot be written, before anything is made."""
+def check_outputs(output: Path | None, csv: Path | None, *, as_json: bool) -> None:
+    """Refuse files that cannot be written, and two things on stdout, before anything is made."""
+    if csv == STDOUT and as_json:
+        raise UsageError("--csv - and --json both go to stdout: choose one, or name a file")
     if output is not None and csv is not None and output.resolve() == csv.resolve():
         raise UsageError(f"{output} cannot be both the image and its numbers: name two files")
-    for path in (output, csv):
+    for path in (output, None if csv == STDOUT else csv):
         if path is not None and (path.is_dir() or not os.access(path if _in_place(path) else path.parent, os.W_OK)):
             raise StorageError(f"cannot write {path}: name a file in a folder that can be written to")
 
@@ -47,7 +52,9 @@ def write_outputs(console: Console, image: bytes, output: Path | None, content: 
     if output is not None:
         _write(output, image)
         console.note(f"wrote {output}")
-    if csv is not None:
+    if csv == STDOUT:
+        write_csv(content, sys.stdout)
+    elif csv is not None:
         text = StringIO()
         write_csv(content, text)
         _write(csv, text.getvalue().encode())

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, get_args
 import typer
 
 from koopcli.checks import candidates
+from koopcli.cli.completion import complete_figure, complete_name
 from koopcli.cli.invocation import begin, print_json
-from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption, complete_name
-from koopcli.cli.outputs import CsvOption, OutputOption, check_outputs, image_format, write_outputs
+from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption
+from koopcli.cli.outputs import STDOUT, CsvOption, OutputOption, check_outputs, image_format, write_outputs
 from koopcli.config.changes import SECTIONS, flat
 from koopcli.config.pictures import FigureName
 from koopcli.console import show_table
@@ -22,7 +23,9 @@ if TYPE_CHECKING:
 
 
 def plot(
-    figure: Annotated[str | None, typer.Argument(help="Name of the figure; --list shows them.")] = None,
+    figure: Annotated[
+        str | None, typer.Argument(autocompletion=complete_figure, help="Name of the figure; --list shows them.")
+    ] = None,
     artefacts: Annotated[
         list[str] | None,
         typer.Argument(autocompletion=complete_name, metavar="ARTEFACT", help="What to draw; made when left out."),
@@ -52,7 +55,7 @@ def plot(
     if figure not in get_args(FigureName):
         raise UnknownNameError(f"unknown figure '{figure}'{candidates(figure, get_args(FigureName))}")
     image = image_format(output)
-    check_outputs(output, csv_)
+    check_outputs(output, csv_, as_json=as_json)
     call = begin(store, experiment, set_, SECTIONS)
     from koopcli.figures.registry import FIGURES
     from koopcli.stages import drawn
@@ -77,7 +80,9 @@ def plot(
 
     task = drawn.figure(figure, sources, image, call.experiment, call.simulated, labels)
     told_by = [f"plot.{name}" for name in kind.told]
-    call.run(task, as_json=as_json, dry_run=dry_run, extra=export, reads=(*made.reads, *told_by))
+    call.run(
+        task, as_json=as_json, dry_run=dry_run, extra=export, reads=(*made.reads, *told_by), table_out=csv_ == STDOUT
+    )
 
 
 def _labels(given: list[str] | None, sources: list[Task], kind: FigureKind) -> dict[Task, str] | None:

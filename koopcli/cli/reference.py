@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields
+from textwrap import fill
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import typer
@@ -26,6 +27,7 @@ DECLARED: tuple[tuple[str, Any], ...] = (
     ("reproduce", Reproduce),
 )
 
+WIDTH = 116  # letters of a line
 HEAD = """# Command reference
 
 Written by `make docs` from the commands' own help. Every making command prints the name of its artefact on stdout and
@@ -81,7 +83,8 @@ def _command(name: str, command: Any) -> Iterator[str]:
     words = [_metavar(p) for p in arguments]
     yield f"## koop {name}\n"
     yield f"    koop {' '.join([name, *words, '[OPTIONS]'])}\n"
-    yield f"{about.strip()}\n"
+    for paragraph in about.strip().split("\n\n"):
+        yield f"{fill(paragraph, WIDTH, break_on_hyphens=False)}\n"
     yield f"    {example.strip()}\n"
     for parameter in arguments:
         yield f"* `{_metavar(parameter)}`: {parameter.help}"

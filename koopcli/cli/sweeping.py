@@ -21,11 +21,11 @@ from koopcli.cli.options import (
     StoreOption,
     WorkersOption,
 )
-from koopcli.cli.outputs import OutputOption, check_outputs, image_format, write_outputs
+from koopcli.cli.outputs import STDOUT, OutputOption, check_outputs, image_format, write_outputs
 from koopcli.config.changes import nested
 from koopcli.config.experiment import load_experiment
 from koopcli.config.grids import Grid, parse_grid
-from koopcli.console import show_table
+from koopcli.console import show_line, show_table
 from koopcli.errors import InvalidValueError, KoopError, UsageError
 
 if TYPE_CHECKING:
@@ -59,7 +59,8 @@ def sweep(
     ] = None,
     output: OutputOption = None,
     csv_: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE", help="Write the scores of all cells, as a table.")
+        Path | None,
+        typer.Option("--csv", metavar="FILE", help="Write the scores of all cells, as a table; - writes it to stdout."),
     ] = None,
     workers: WorkersOption = 1,
     cluster: ClusterOption = None,
@@ -82,7 +83,7 @@ def sweep(
         raise UsageError("what is swept? Give a setting several values, such as --set fit-edmd.order=1:12")
     part = _shard(shard)
     image = image_format(output)
-    check_outputs(output, csv_)
+    check_outputs(output, csv_, as_json=as_json)
     call = begin(store, experiment, None, (), None, workers, cluster)
     from koopcli.stages import grid as grids
     from koopcli.stages.pipeline import cost
@@ -138,7 +139,7 @@ def sweep(
             }
         )
     else:
-        print(artefact.record.name)
+        call.print_name(artefact.record.name, table_out=csv_ == STDOUT)
     if failed:
         raise InvalidValueError(
             f"{len(failed)} of {len(chosen)} cells failed and are not in the table: mend what is said of them above"
@@ -258,7 +259,7 @@ def _show_scores(table: Swept) -> None:
     header = [*shown, "functions", *over, "diverged"]
     show_table(header, rows, title=title, left=len(shown), file=sys.stderr)
     if len(table.groups()) > ROWS:
-        print(f"the {ROWS} best of {len(table.groups())} rows; all are in koop show NAME --csv", file=sys.stderr)
+        show_line(f"the {ROWS} best of {len(table.groups())} rows; all are in koop show NAME --csv", sys.stderr)
 
 
 def _percent(value: float) -> str:

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from koopcli.cli.completion import complete_vehicle
 from koopcli.cli.invocation import print_json
 from koopcli.cli.options import JsonOption
 from koopcli.config.data import data_folder, locate
 from koopcli.config.settings import Simulate
-from koopcli.console import Console, show_table
+from koopcli.console import Console, show_line, show_table
 from koopcli.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -22,11 +23,6 @@ if TYPE_CHECKING:
 vehicle = typer.Typer(
     no_args_is_help=True, help="Look into vehicle files: their parameters and what follows from them."
 )
-
-
-def complete_vehicle(incomplete: str) -> list[str]:
-    """Names of shipped vehicles that begin with ``incomplete``, for shell completion."""
-    return [path.stem for path in _shipped() if path.stem.startswith(incomplete)]
 
 
 NameArgument = Annotated[
@@ -103,12 +99,12 @@ def _print(found: VehicleFile, dt: float, said: list[str], *, as_json: bool) -> 
         about = {"title": found.title, "source": found.source, "plants": plants_of(p), "remarks": said}
         print_json({**about, "parameters": asdict(p), "derived": following})
         return
-    print(found.title or "a vehicle without a title")
+    show_line(found.title or "a vehicle without a title")
     show_table(["parameter", "meaning", "value", "unit"], list(_parameters(p)), left=2)
     rows = [[one.name, _shown(one.name, one.value), one.unit] for one in numbers]
     show_table(["what follows", "value", "unit"], rows, left=1)
     if found.source:
-        print(f"source: {found.source}")
+        show_line(f"source: {found.source}")
 
 
 def _shown(name: str, value: float) -> str:

@@ -15,6 +15,7 @@ from koopcli.config.pictures import PlotOptions
 from koopcli.config.samples import ELSEWHERE, OF_SIMULATION, OF_VEHICLE, SAMPLED_FOR, SAMPLES, SampleSettings
 from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, KoopError, UsageError
+from koopcli.text import read_text
 from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
 
 KINDS = {"sample": tuple(SAMPLES), "test": ("box", "point", "ball", "drive-test", "manoeuvre")}
@@ -173,7 +174,7 @@ def vehicle_named(name: str, folder: Path = Path()) -> VehicleParameters:
 
 def _read(path: Path, here: Origin) -> Changes:
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        content = tomllib.loads(read_text(path))
     except (OSError, ValueError, RecursionError) as error:
         raise InvalidValueError(here.say(f"cannot read the experiment file: {error}")) from error
     for section, values in content.items():

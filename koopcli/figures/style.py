@@ -15,6 +15,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from mpl_toolkits.mplot3d import Axes3D
 
 from koopcli.figures.colours import COLOURS, DASHES
+from koopcli.text import printable
 
 COLUMN = 3.5  # inches, one column of a two-column page
 
@@ -55,8 +56,10 @@ def looks(count: int) -> list[dict[str, Any]]:
 
 
 def plain(text: str) -> str:
-    """A user's text as it stands: neither mathematics nor, with a line in front, something to leave out of legends."""
-    shown = text.replace("$", r"\$")
+    """A user's text as it stands: neither mathematics nor, with a line in front, something to leave out of legends;
+    no control character, which an svg file may not hold.
+    """
+    shown = printable(text).replace("$", r"\$")
     return f"\u200b{shown}" if shown.startswith("_") else shown
 
 

@@ -12,7 +12,7 @@ from koopcli.errors import InvalidValueError, UnknownNameError
 from koopcli.progress import Progress
 from koopcli.records import Meta, Packed
 from koopcli.store.files import size_text
-from koopcli.store.records import SHORT
+from koopcli.store.names import SHORT
 
 Inputs = Mapping[str, Any]  # role -> record
 MEMORY_SHARE = 0.4  # arrays are held about twice while they are made and stored

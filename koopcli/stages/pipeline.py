@@ -17,8 +17,8 @@ from koopcli.stages.workers import Workers
 from koopcli.store import Record, Store
 from koopcli.store.code import code_digest
 from koopcli.store.identity import key_of
+from koopcli.store.names import SHORT
 from koopcli.store.provenance import provenance
-from koopcli.store.records import SHORT
 
 
 @dataclass(frozen=True)

@@ -24,5 +24,5 @@ def describe(figures: Meta) -> str:
     way = f", by {figures['solved_by']}" if figures["solved_by"] else ""
     return (
         f"{figures['functions']} functions, rank {figures['rank']} of {figures['directions']}, "
-        f"condition {figures['condition']:.2g}, spectral radius {figures['spectral_radius']:.6f}{way}"
+        f"condition {figures['condition']:.2g}, spectral radius {figures['spectral_radius']:.6g}{way}"
     )

@@ -16,10 +16,11 @@ from pathlib import Path
 
 from koopcli.errors import DamagedArtefactError, StorageError
 from koopcli.progress import Progress, silent
-from koopcli.store.files import DAY, HOUR, make_folder, own_name, printable, storage_errors
+from koopcli.store.files import DAY, HOUR, make_folder, own_name, storage_errors
 from koopcli.store.locks import if_free
 from koopcli.store.store import Store
 from koopcli.store.survey import DIGEST, File, Recorded, Survey, look, object_path, pinned, records, survey
+from koopcli.text import printable
 
 NAMES = re.compile(rf"(?<![0-9a-f]){DIGEST}(?![0-9a-f])".encode())
 

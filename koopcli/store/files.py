@@ -26,11 +26,6 @@ class UntrustedFileError(DamagedArtefactError):
     """A file that koop did not write. The text is the reason alone: a caller that knows what the file is names it."""
 
 
-def printable(text: str) -> str:
-    """``text`` with everything replaced that would steer a terminal."""
-    return "".join(c if c.isprintable() else "�" for c in text)
-
-
 @contextmanager
 def storage_errors(path: Path, needed: float = 0) -> Iterator[None]:
     """Turn an ``OSError`` of writing to ``path`` into one line: what failed, what was needed and what is free."""

@@ -19,10 +19,11 @@ import numpy as np
 
 from koopcli.errors import InvalidValueError
 from koopcli.records import Array, Packed
-from koopcli.store.files import UntrustedFileError, open_regular, printable, refuse_without_room, write_at
+from koopcli.store.files import UntrustedFileError, open_regular, refuse_without_room, write_at
 from koopcli.store.identity import canonical, plain, slabs
 from koopcli.store.texts import Texts
 from koopcli.store.walk import LARGEST, refusals, refuse, walk
+from koopcli.text import printable
 
 IMAGE_LIMIT = 32 << 20  # bytes that are laid out in memory, which takes several times as many
 MEMORY_LIMIT = 256 << 20  # bytes that are read as a whole

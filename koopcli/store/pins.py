@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from koopcli.errors import UnknownNameError
-from koopcli.store.files import printable, publish, reading_errors, storage_errors
+from koopcli.store.files import publish, reading_errors, storage_errors
 from koopcli.store.records import Record
 from koopcli.store.store import Store
 from koopcli.store.survey import pinned
+from koopcli.text import printable
 
 
 def pin(store: Store, label: str, records: Sequence[Record]) -> None:

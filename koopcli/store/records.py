@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from koopcli.errors import InvalidValueError, NewerFormatError
 from koopcli.store.identity import SCHEMA, canonical, key_of
-
-SHORT = 12  # digits of a key in a name
-STAGE = re.compile(r"[a-z][a-z0-9-]{0,63}")
-DIGEST = re.compile(r"[0-9a-f]{64}")
+from koopcli.store.names import DIGEST, SHORT, is_name
 
 
 class BadRecordError(Exception):
@@ -83,18 +79,6 @@ class Record:
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError, InvalidValueError) as error:
             raise BadRecordError from error
         return record
-
-
-def is_name(name: object) -> bool:
-    """Whether ``name`` is "stage/key", which leads to a record and nowhere else."""
-    stage, _, key = name.partition("/") if isinstance(name, str) else ("", "", "")
-    return bool(STAGE.fullmatch(stage) and DIGEST.fullmatch(key))
-
-
-def short_name(name: str) -> str:
-    """ "stage/key" as commands print it."""
-    stage, _, key = name.partition("/")
-    return f"{stage}/{key[:SHORT]}"
 
 
 def _well_formed(record: Record) -> bool:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -36,21 +35,12 @@ from koopcli.store.files import (
 )
 from koopcli.store.identity import data_digest
 from koopcli.store.locks import hold
+from koopcli.store.names import SHORT, index, is_name
 from koopcli.store.parts import Parts
-from koopcli.store.records import SHORT, BadRecordError, Record, is_name
+from koopcli.store.records import BadRecordError, Record
 
-KEY = re.compile(r"([0-9a-f]{64})\.json")
 CANDIDATES = 8
 AGAIN = 3  # times to read a file that others replace meanwhile, before it is taken for damaged
-
-
-def store_root(given: str | Path | None = None) -> Path:
-    """The store's folder: ``given``, else ``$KOOP_STORE``, else ``./artefacts``."""
-    text = str(given or os.environ.get("KOOP_STORE") or "artefacts")
-    try:
-        return Path(text).expanduser()
-    except RuntimeError as error:
-        raise StorageError(f"the store {text}: {error}") from error
 
 
 class Store:
@@ -86,23 +76,21 @@ class Store:
 
     def index(self) -> list[tuple[str, str]]:
         """(stage, key) of every record, by stage."""
-        found = []
-        try:
-            with reading_errors(self.root):
-                for stage in os.scandir(self.root / "records"):
-                    if stage.is_dir():
-                        found += [(stage.name, KEY.fullmatch(file.name)) for file in os.scandir(stage)]
-        except FileNotFoundError:
-            return []
-        return sorted((stage, match[1]) for stage, match in found if match)
+        with reading_errors(self.root):
+            return index(self.root)
 
     def find(self, text: str) -> Record:
         """The record whose name or key starts with ``text``.
 
-        Raises ``UnknownNameError`` for none or several, ``DamagedArtefactError`` when its record does not read.
+        Raises ``UnknownNameError`` for none or several, also where no name is given, and ``DamagedArtefactError``
+        when its record does not read.
         """
+        if not text.strip():
+            raise UnknownNameError(
+                f"the name '{text}' is empty, as a failed command leaves it: name an artefact, `koop ls` lists them"
+            )
         known = [(stage, key) for stage, key in self.index() if is_name(f"{stage}/{key}")]
-        matches = [(s, k) for s, k in known if text and (f"{s}/{k}".startswith(text) or k.startswith(text))]
+        matches = [(s, k) for s, k in known if f"{s}/{k}".startswith(text) or k.startswith(text)]
         if len(matches) > 1:
             names = ", ".join(f"{stage}/{key[:SHORT]}" for stage, key in matches[:CANDIDATES])
             more = f" and {len(matches) - CANDIDATES} more" if len(matches) > CANDIDATES else ""

@@ -12,7 +12,8 @@ from pathlib import Path
 from koopcli.errors import NewerFormatError
 from koopcli.progress import Progress, silent
 from koopcli.store.files import UntrustedFileError, read_small, reading_errors
-from koopcli.store.records import STAGE, BadRecordError, Record, is_name
+from koopcli.store.names import STAGE, is_name
+from koopcli.store.records import BadRecordError, Record
 
 DIGEST = "[0-9a-f]{64}"
 WRITER = r"\d+-[0-9a-f]{16}@.+"  # the process that writes or removes a file

@@ -11,7 +11,8 @@ from pathlib import Path
 from koopcli.progress import Progress, silent
 from koopcli.records import Packed
 from koopcli.store.files import HOUR, UntrustedFileError, open_regular, size_text
-from koopcli.store.records import Record, short_name
+from koopcli.store.names import short_name
+from koopcli.store.records import Record
 from koopcli.store.store import Store
 from koopcli.store.survey import Recorded, Survey, object_path, survey
 

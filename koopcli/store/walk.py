@@ -16,7 +16,8 @@ import h5py
 import numpy as np
 from h5py import h5a, h5d, h5g, h5l, h5o, h5s, h5t, h5z
 
-from koopcli.store.files import UntrustedFileError, printable
+from koopcli.store.files import UntrustedFileError
+from koopcli.text import printable
 
 DEPTH = 16  # groups within groups
 OBJECTS = 10_000

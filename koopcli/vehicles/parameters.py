@@ -10,6 +10,7 @@ from typing import Any
 
 from koopcli.checks import Origin, build, candidates, from_file, setting
 from koopcli.errors import InvalidValueError
+from koopcli.text import read_text
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ def read_vehicle_file(path: Path) -> VehicleFile:
     """
     here = from_file(path)
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        content = tomllib.loads(read_text(path))
     except tomllib.TOMLDecodeError as error:
         raise InvalidValueError(here.say(f"not valid TOML: {error}")) from error
     except (OSError, ValueError, RecursionError) as error:

@@ -128,6 +128,7 @@ def one_line(result, code, *parts):
         (["fit-edmd", "simulate/abc"], 4, "koop ls"),
         (["evaluate", "abc"], 4, "koop ls"),
         (["plot", "ordres"], 4, "did you mean 'orders'"),
+        (["plot", ""], 4, "unknown figure ''"),
         (["show", "abc"], 4, "koop ls"),
         (["ls", "stages"], 4, "fit-edmd"),
     ],
@@ -151,6 +152,30 @@ def test_a_bad_vehicle_file(koop, folder):
     (folder / "bad.toml").write_text(BAD_VEHICLE)
     one_line(koop("fit-edmd", "--set", "vehicle.name=./bad.toml"), 3, "bad.toml", "'parameters.m' must be above 0 kg")
     assert not (folder / "artefacts").exists()
+
+
+@pytest.mark.parametrize(
+    ("command", "name"), [(["vehicle", "check"], "my.toml"), (["fit-edmd", "--experiment"], "./my.toml")]
+)
+def test_a_file_of_another_encoding(koop, folder, command, name):
+    (folder / name).write_text("title = 'a'", encoding="utf-16")
+    one_line(koop(*command, name, tiny=False), 3, "my.toml", "it is UTF-16: save it as UTF-8")
+
+
+def test_what_a_file_holds_steers_no_terminal(koop, folder):
+    from koopcli.config.data import data_folder
+
+    shipped = (data_folder() / "vehicles" / "ctu-2020.toml").read_text()
+    about = 'title = "a\\u001b]0;owned\\u0007"\nsource = "x\\u001b[2J"\n'
+    (folder / "v.toml").write_text(about + shipped[shipped.index("[parameters]") :])
+    (folder / "e.toml").write_text('[fit-edmd]\n"o\\u001b]0;owned\\u0007r" = 1\n')
+    checked = koop("vehicle", "check", "v.toml", tiny=False)
+    refused = koop("fit-edmd", "--experiment", "./e.toml", tiny=False)
+    assert "a�]0;owned�\n" in checked.out
+    assert "source: x�[2J\n" in checked.out
+    one_line(refused, 3, "fit-edmd.o�]0;owned�r")
+    for text in (checked.out, checked.err, refused.err):
+        assert text.replace("\n", "").isprintable()
 
 
 def test_an_unknown_experiment(koop):

@@ -73,11 +73,3 @@ def test_a_fit_needs_no_pictures(folder):
 def test_version_and_module():
     done = subprocess.run([sys.executable, "-m", "koopcli", "--version"], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("koop ")
-
-
-def test_names_complete(koop, monkeypatch):
-    from koopcli.cli.options import complete_name
-
-    name = koop("sample").name
-    assert complete_name("sam") == [name]
-    assert complete_name("fit") == []

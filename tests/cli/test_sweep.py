@@ -38,8 +38,9 @@ def test_it_says_its_name_shows_a_table_and_draws(koop, folder):
     assert "seeds" in made.err
     shown = koop("show", made.name, "--csv")
     assert shown.out.splitlines()[1:] == (folder / "sweep.csv").read_text().splitlines()[1:]
-    again = koop("sweep", *GRID)
-    assert again.name == made.name
+    again = koop("sweep", *GRID, "--csv", "-")
+    assert again.out == (folder / "sweep.csv").read_text()
+    assert made.name in again.err.splitlines()
     assert "made in" not in again.err
     assert koop("plot", "sweep", made.name, "-o", "again.svg").code == 0
 

@@ -14,11 +14,12 @@ import pytest
 from koopcli.errors import DamagedArtefactError, InvalidValueError
 from koopcli.records import Array, Packed
 from koopcli.store import Record, Store, image
-from koopcli.store.files import UntrustedFileError, open_regular, printable, read_small
+from koopcli.store.files import UntrustedFileError, open_regular, read_small
 from koopcli.store.identity import SCHEMA
 from koopcli.store.pins import pins
 from koopcli.store.records import BadRecordError
 from koopcli.store.texts import Texts
+from koopcli.text import printable
 from tests.store import hostile
 from tests.store.hostile import CASES, FOREIGN, LENGTH, RAW, watched
 

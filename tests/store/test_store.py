@@ -22,8 +22,8 @@ from koopcli.store import parts as parts_module
 from koopcli.store.code import code_digest
 from koopcli.store.files import make_folder, publish, size_text, sweep
 from koopcli.store.identity import SCHEMA
+from koopcli.store.names import store_root
 from koopcli.store.pins import pin, pins, unpin
-from koopcli.store.store import store_root
 
 
 def packed(value=1.0, n=4) -> Packed:

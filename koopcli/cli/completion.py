@@ -1,0 +1,56 @@
+"""What a shell completes besides options: names that are known, found without numerics.
+
+A completion never complains: where names cannot be listed there are none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import get_args
+
+import typer
+
+from koopcli.config.data import data_folder
+from koopcli.config.pictures import FigureName
+from koopcli.errors import KoopError
+
+STAGES = ("sample", "simulate", "fit-edmd", "fit-eigen", "baseline", "evaluate", "sweep", "plot")  # heavy to ask for
+
+
+def complete_name(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Artefacts in the store, that of ``--store`` where it stands before."""
+    from koopcli.store.names import index, is_name, short_name, store_root
+
+    try:
+        names = [f"{stage}/{key}" for stage, key in index(store_root(ctx.params.get("store")))]
+    except (KoopError, OSError):
+        return []
+    return _beginning(map(short_name, filter(is_name, names)), incomplete)
+
+
+def complete_stage(incomplete: str) -> list[str]:
+    """Stages."""
+    return _beginning(STAGES, incomplete)
+
+
+def complete_figure(incomplete: str) -> list[str]:
+    """Figures."""
+    return _beginning(get_args(FigureName), incomplete)
+
+
+def complete_experiment(incomplete: str) -> list[str]:
+    """Shipped experiments; a shell completes files itself."""
+    return _beginning(_shipped("experiments"), incomplete)
+
+
+def complete_vehicle(incomplete: str) -> list[str]:
+    """Shipped vehicles; a shell completes files itself."""
+    return _beginning(_shipped("vehicles"), incomplete)
+
+
+def _shipped(folder: str) -> list[str]:
+    return sorted(path.stem for path in (data_folder() / folder).glob("*.toml"))
+
+
+def _beginning(names: Iterable[str], incomplete: str) -> list[str]:
+    return [name for name in names if name.startswith(incomplete)]
