@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from koopcli.checks import candidates
-from koopcli.errors import UsageError
+from koopcli.errors import InvalidValueError, UsageError
+from koopcli.parsing import DEEPEST, TooDeepError, parse_toml
 
 SECTIONS = (
     "vehicle",
@@ -45,6 +45,8 @@ def nested(named: Iterable[tuple[str, Any]]) -> Changes:
     changes: Changes = {}
     for name, value in named:
         section, *keys = name.split(".")
+        if len(keys) > DEEPEST:
+            raise UsageError(f"--set {name[:20]}…: {TooDeepError()}: name a setting, such as vehicle.Jzz")
         table = changes.setdefault(section, {})
         for key in keys[:-1]:
             table = table.setdefault(key, {})
@@ -64,9 +66,13 @@ def flat(changes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
 
 
 def toml_value(text: str) -> object:
-    """``text`` as one TOML value, or as it stands."""
+    """``text`` as one TOML value, or as it stands. Raises ``InvalidValueError`` for one that is nested too deep."""
     try:
-        parsed = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):
+        parsed = parse_toml(f"value = {text}")
+    except TooDeepError as error:
+        raise InvalidValueError(
+            f"the value {text.strip()[:20]}… is {error}: write a value that its setting takes"
+        ) from error
+    except ValueError:
         return text.strip()
     return parsed["value"] if len(parsed) == 1 else text.strip()

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from koopcli.errors import InvalidValueError, NewerFormatError
+from koopcli.parsing import parse_json
 from koopcli.store.identity import SCHEMA, canonical, key_of
 
 SHORT = 12  # digits of a key in a name
@@ -64,9 +65,9 @@ class Record:
         Raises ``BadRecordError`` for a damaged record and ``NewerFormatError`` for one of a newer schema.
         """
         try:
-            content = json.loads(text)
+            content = parse_json(text)
             schema = content["schema"]
-        except (ValueError, KeyError, TypeError, RecursionError) as error:
+        except (ValueError, KeyError, TypeError) as error:
             raise BadRecordError from error
         if isinstance(schema, int) and schema > SCHEMA:
             raise NewerFormatError(
@@ -80,7 +81,7 @@ class Record:
             record = cls(**content)
             if not _well_formed(record) or (record.stage, record.key) != (stage, key):
                 raise BadRecordError
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError, InvalidValueError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, InvalidValueError) as error:
             raise BadRecordError from error
         return record
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from koopcli.checks import Origin, build, candidates, from_file, setting
 from koopcli.errors import InvalidValueError
+from koopcli.parsing import parse_toml
 
 
 @dataclass(frozen=True)
@@ -83,10 +84,10 @@ def read_vehicle_file(path: Path) -> VehicleFile:
     """
     here = from_file(path)
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        content = parse_toml(path.read_text(encoding="utf-8-sig"))
     except tomllib.TOMLDecodeError as error:
         raise InvalidValueError(here.say(f"not valid TOML: {error}")) from error
-    except (OSError, ValueError, RecursionError) as error:
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InvalidValueError(here.say(f"cannot read the vehicle file: {reason}")) from error
     known = ("title", "source", "parameters", *TYRES)
