@@ -253,7 +253,7 @@ def test_a_scheduler_file_that_is_too_deep_is_no_scheduler(tmp_path):
     file = tmp_path / "scheduler.json"
     file.write_text('{"address": "tcp://127.0.0.1:1", "more": ' + "[" * 100_000 + "]" * 100_000 + "}")
     with pytest.raises(InvalidValueError, match="no Dask scheduler answers there"):
-        Cluster(str(file)).begin(tmp_path)
+        Workers(cluster=str(file)).begin(tmp_path)
 
 
 def test_without_the_extra_it_says_what_to_install(tmp_path, monkeypatch):
