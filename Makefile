@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 KOOP := $(BIN)/koop
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-edmd reproduce-eigen reproduce-beyond smoke test test-all check docs pins bench peers scaling faults \
+.PHONY: help reproduce reproduce-edmd reproduce-eigen reproduce-beyond smoke test test-all check docs pins bench peers scaling faults kernels \
   traps wheel clean
 
 help: ## Show this help
@@ -61,6 +61,9 @@ faults: $(VENV)/.developing ## Count what a store loses under thousands of fault
 
 traps: $(VENV)/.developing ## Measure what generic least squares makes of raw monomials (minutes)
 	$(BIN)/python benchmarks/traps.py
+
+kernels: $(VENV)/.developing ## Run the numerical tests under every kernel of OpenBLAS that this processor has (minutes)
+	$(BIN)/python -m tests.kernels
 
 wheel: $(VENV)/.developing ## Build the wheel into dist/
 	rm -rf dist

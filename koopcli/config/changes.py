@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from typing import Any
 
 from koopcli.checks import candidates
-from koopcli.errors import UsageError
+from koopcli.errors import InvalidValueError, UsageError
+from koopcli.parsing import DEEPEST, TooDeepError, parse_toml
 
 SECTIONS = (
     "vehicle",
@@ -49,6 +48,8 @@ def nested(named: Iterable[tuple[str, Any]]) -> Changes:
     changes: Changes = {}
     for name, value in named:
         section, *keys = name.split(".")
+        if len(keys) > DEEPEST:
+            raise UsageError(f"--set {name[:20]}…: {TooDeepError()}: name a setting, such as vehicle.Jzz")
         table = changes.setdefault(section, {})
         for key in keys[:-1]:
             table = table.setdefault(key, {})
@@ -68,12 +69,21 @@ def flat(changes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
 
 
 def toml_value(text: str) -> object:
-    """``text`` as one TOML value, its numbers also as an option takes them (.5, 5., 007), or as it stands."""
+    """``text`` as one TOML value, its numbers also as an option takes them (.5, 5., 007), or as it stands.
+
+    Raises ``InvalidValueError`` for one that is nested too deep.
+    """
     for written in (str, _with_toml_numbers):
-        with suppress(ValueError, RecursionError):
-            parsed = tomllib.loads(f"value = {written(text)}")
-            if len(parsed) == 1:
-                return parsed["value"]
+        try:
+            parsed = parse_toml(f"value = {written(text)}")
+        except TooDeepError as error:
+            raise InvalidValueError(
+                f"the value {text.strip()[:20]}… is {error}: write a value that its setting takes"
+            ) from error
+        except ValueError:
+            continue
+        if len(parsed) == 1:
+            return parsed["value"]
     return text.strip()
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from koopcli.config.pictures import PlotOptions
 from koopcli.config.samples import ELSEWHERE, OF_SIMULATION, OF_VEHICLE, SAMPLED_FOR, SAMPLES, SampleSettings
 from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, KoopError, UsageError
+from koopcli.parsing import parse_toml
 from koopcli.text import read_text
 from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
 
@@ -174,8 +174,8 @@ def vehicle_named(name: str, folder: Path = Path()) -> VehicleParameters:
 
 def _read(path: Path, here: Origin) -> Changes:
     try:
-        content = tomllib.loads(read_text(path))
-    except (OSError, ValueError, RecursionError) as error:
+        content = parse_toml(read_text(path))
+    except (OSError, ValueError) as error:
         raise InvalidValueError(here.say(f"cannot read the experiment file: {error}")) from error
     for section, values in content.items():
         if not isinstance(values, dict):

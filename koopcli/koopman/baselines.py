@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from koopcli.koopman.coverage import Coverage
+from koopcli.progress import Progress, silent
 from koopcli.records import Channels, FloatArray, Meta, Packed
 from koopcli.vehicles.plants import remembered_plant
 
@@ -41,7 +42,7 @@ class Forecast:
         """Nothing is known of its errors."""
         return None
 
-    def predict(self, x0: FloatArray, u: FloatArray) -> FloatArray:
+    def predict(self, x0: FloatArray, u: FloatArray, *, progress: Progress = silent) -> FloatArray:
         """States (n, steps+1, n_x) from ``x0`` (n, n_x) under ``u`` (n, steps, n_u)."""
         return FORECASTS[self.kind](self, x0, u)
 

@@ -12,6 +12,7 @@ from koopcli.errors import InvalidValueError
 from koopcli.koopman import metrics
 from koopcli.koopman.coverage import Coverage
 from koopcli.koopman.modes import IndexArray
+from koopcli.progress import Progress, silent, within
 from koopcli.records import Array, BoolArray, Channels, FloatArray, Meta, Packed, Trajectories
 
 
@@ -45,7 +46,7 @@ class Forecaster(Protocol):
     def bound(self, x: FloatArray) -> FloatArray | None:
         """What it says the error in percent from ``x`` (n, n_x) stays below, (n,), if it says so at all."""
 
-    def predict(self, x0: FloatArray, u: FloatArray) -> FloatArray:
+    def predict(self, x0: FloatArray, u: FloatArray, *, progress: Progress = silent) -> FloatArray:
         """States (n, steps+1, n_x) from ``x0`` (n, n_x) under ``u`` (n, steps, n_u)."""
 
     def step(self, x: FloatArray, u: FloatArray) -> FloatArray:
@@ -189,6 +190,7 @@ def evaluate(
     first: int,
     restart: int | None = None,
     relift: bool = True,
+    progress: Progress = silent,
 ) -> Evaluation:
     """Score ``predictor`` on the trajectories ``rows``, samples k = ``first`` .. steps.
 
@@ -199,25 +201,38 @@ def evaluate(
     _check(predictor, trajectories, first, restart)
     x, u = np.asarray(trajectories.x[rows]), np.asarray(trajectories.u[rows])
     every = restart or trajectories.steps
-    starts = range(0, trajectories.steps, every)
-    parts = [_score(predictor, x[:, k : k + every + 1], u[:, k : k + every], first, k, relift) for k in starts]
+    parts = []
+    for k in range(0, trajectories.steps, every):
+        stop = min(k + every, trajectories.steps)
+        part = within(progress, k, stop, trajectories.steps)
+        parts.append(_score(predictor, x[:, k : stop + 1], u[:, k:stop], first, k, relift, part))
+        part(1, 1)
     order = np.argsort(np.tile(np.arange(len(x)), len(parts)), kind="stable")
     steps = min(every, trajectories.steps)
     return replace(_reordered(join(parts), order), restart=restart, steps=steps)
 
 
 def _score(
-    predictor: Forecaster, x: FloatArray, u: FloatArray, first: int, start: int, lifted_afresh: bool
+    predictor: Forecaster,
+    x: FloatArray,
+    u: FloatArray,
+    first: int,
+    start: int,
+    lifted_afresh: bool,
+    progress: Progress,
 ) -> Evaluation:
     """The scores of one prediction for each of ``x`` (n, steps+1, n_x) under ``u`` (n, steps, n_u)."""
     domain, bound = predictor.coverage.domain, predictor.bound(x[:, 0])
     with np.errstate(over="ignore", invalid="ignore"):  # a diverging prediction is a result, not an accident
-        once = predictor.predict(x[:, 0], u)
+        kinds = 1 + lifted_afresh
+        once = predictor.predict(x[:, 0], u, progress=within(progress, 0, 1, kinds))
+        afresh = within(progress, 1, 2, kinds)
         relift = np.empty_like(once)
         relift[:, 0], at = once[:, 0], x[:, 0]  # the first step starts from the state that is known
         relift[:, 1:] = np.nan
         for k in range(u.shape[1] if lifted_afresh else 0):
             relift[:, k + 1] = at = predictor.step(at, u[:, k])
+            afresh(k + 1, u.shape[1])
         scored = slice(first, None)
         return Evaluation(
             x0=x[:, 0],

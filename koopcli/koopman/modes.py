@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -64,6 +64,10 @@ class Modes:
         """``rows`` (..., N) times A."""
         blocks = rows.reshape(*rows.shape[:-1], self.copies, len(self.rates))
         return np.asarray(blocks @ self.block).reshape(rows.shape)
+
+    def after(self, steps: int) -> Modes:
+        """A^``steps``, by the same rates."""
+        return replace(self, dt=steps * self.dt)
 
     def powers(self, steps: int) -> FloatArray:
         """The block after 0 .. ``steps`` steps, (steps + 1, L, L)."""

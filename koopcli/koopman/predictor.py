@@ -17,6 +17,7 @@ from koopcli.koopman.lifts import Lift, Observed
 from koopcli.koopman.modes import Modes
 from koopcli.koopman.tabulated import Tabulated
 from koopcli.koopman.trust import Trust
+from koopcli.progress import Progress, silent
 from koopcli.records import Array, Channels, FloatArray, Meta, Packed
 
 TABLES: dict[str, type[Tabulated] | type[Futures]] = {table.kind: table for table in (Tabulated, Futures)}  # of samples
@@ -79,7 +80,13 @@ class Predictor:
         flat = x.reshape(math.prod(x.shape[:-1]), x.shape[-1])
         return self.observables.lift(flat).reshape(*x.shape[:-1], self.functions)
 
-    def predict(self, x0: FloatArray, u: FloatArray | None = None, steps: int | None = None) -> FloatArray:
+    def predict(
+        self,
+        x0: FloatArray,
+        u: FloatArray | None = None,
+        steps: int | None = None,
+        progress: Progress = silent,
+    ) -> FloatArray:
         """The predicted states (..., steps+1, n_x), lifted once at ``x0`` (..., n_x).
 
         ``u`` (..., steps, n_u) acts from sample k to k+1; without it the input is zero for ``steps`` steps.
@@ -104,7 +111,7 @@ class Predictor:
         if self._advance is None:
             x = responses.linear(self.observables, self.A, self.B, self.C, x0, u)
         else:
-            x = responses.rolled(self.observables, self._advance, self.C, x0, u)
+            x = responses.rolled(self.observables, self._advance, self.C, x0, u, progress)
         return x.reshape(*shape, k + 1, n_x)
 
     def bound(self, x: FloatArray) -> FloatArray | None:

@@ -8,11 +8,14 @@ import numpy as np
 
 from koopcli.koopman.lifts import Lift
 from koopcli.koopman.modes import Modes
+from koopcli.progress import Progress, silent
 from koopcli.records import FloatArray
 
 SEGMENT = 128  # steps whose responses are formed together
 ROLLED = 1024  # trajectories whose lifted states are rolled together
 MOST_TERMS = 64  # of Taylor's series; a step that needs more leaves the finite numbers anyway
+
+Seen = Callable[[FloatArray], FloatArray]  # rows (R, N) to what they see of the lifted states, (n, R)
 
 
 def linear(
@@ -20,8 +23,52 @@ def linear(
 ) -> FloatArray:
     """x̂_k = C A^k ψ(x_0) + Σ_i C A^(k-1-i) B u_i (4.3), (n, steps+1, n_x), for ``x0`` (n, n_x), ``u`` (n, steps, n_u).
 
-    Only the n_x rows of C A^k are ever formed; the lifted state is not rolled. Time goes in segments, so that memory
-    grows with the steps and not with their square.
+    Up to as many steps as there are lifted states, or ``SEGMENT``, only the n_x rows of C A^k are formed, and ψ(x_0)
+    need not be. More steps are cut into equal stretches no longer than that, whose first lifted states follow from one
+    another (4.11); each is then predicted like a trajectory of its own. So time and memory grow as the steps. Such a
+    stretch is long enough for A^length to cost about what its rows do.
+    """
+    n, steps, n_u = u.shape
+    stretches = -(-steps // max(SEGMENT, len(A)))
+    if stretches <= 1:
+        return _response(lambda rows: lift.observe(x0, rows), A, B, C, u)
+    length = -(-steps // stretches)
+    inputs = np.zeros((n, stretches * length, n_u))
+    inputs[:, :steps] = u
+    z = _starts(lift.lift(x0), A, B, inputs.reshape(n, stretches, length, n_u)).reshape(n * stretches, len(A))
+    parts = _response(lambda rows: z @ rows.T, A, B, C, inputs.reshape(n * stretches, length, n_u))
+    parts = parts.reshape(n, stretches, length + 1, len(C))
+    x = np.empty((n, steps + 1, len(C)))
+    x[:, :-1] = parts[:, :, :-1].reshape(n, stretches * length, len(C))[:, :steps]
+    x[:, -1] = parts[:, -1, steps - (stretches - 1) * length]
+    return x
+
+
+def _starts(z0: FloatArray, A: FloatArray | Modes, B: FloatArray, u: FloatArray) -> FloatArray:
+    """The lifted states (n, stretches, N) at the start of each stretch, for ``z0`` (n, N) and ``u`` (n, stretches,
+    length, n_u): z_(s+1) = A^length z_s + Σ_i A^(length-1-i) B u_i (4.11).
+    """
+    n, stretches, length, n_u = u.shape
+    reached = np.empty((length, n_u, len(A)))  # A^(length-1-i) B
+    columns = B
+    for i in reversed(range(length)):
+        reached[i] = columns.T
+        columns = A @ columns
+    z = np.empty((n, stretches, len(A)))
+    z[:, 0] = z0
+    z[:, 1:] = (u[:, :-1].reshape(n * (stretches - 1), length * n_u) @ reached.reshape(length * n_u, -1)).reshape(
+        n, stretches - 1, len(A)
+    )
+    onward = A.after(length) if isinstance(A, Modes) else np.linalg.matrix_power(A, length)
+    for s in range(1, stretches):
+        z[:, s] += (onward @ z[:, s - 1].T).T
+    return z
+
+
+def _response(seen: Seen, A: FloatArray | Modes, B: FloatArray, C: FloatArray, u: FloatArray) -> FloatArray:
+    """(4.3) for the lifted states that ``seen`` sees, (n, steps+1, n_x), with ``u`` (n, steps, n_u).
+
+    Time goes in segments; what each input adds costs the square of the steps.
     """
     n, steps, n_u = u.shape
     n_x, N = C.shape
@@ -34,7 +81,7 @@ def linear(
         for k in range(stop - start):
             observed[k] = rows
             rows = rows @ A
-        x[:, start:stop] = lift.observe(x0, observed.reshape(-1, N)).reshape(n, stop - start, n_x)
+        x[:, start:stop] = seen(observed.reshape(-1, N)).reshape(n, stop - start, n_x)
         markov[start : min(stop, steps)] = observed[: steps - start] @ B
     for first in range(0, steps, SEGMENT):  # the inputs of one segment ...
         inputs = u[:, first : first + SEGMENT]
@@ -57,7 +104,9 @@ def _toeplitz(markov: FloatArray, delay: int, inputs: int, samples: int) -> Floa
 Advance = Callable[[FloatArray, FloatArray], FloatArray]
 
 
-def rolled(lift: Lift, advance: Advance, C: FloatArray, x0: FloatArray, u: FloatArray) -> FloatArray:
+def rolled(
+    lift: Lift, advance: Advance, C: FloatArray, x0: FloatArray, u: FloatArray, progress: Progress = silent
+) -> FloatArray:
     """x̂_k = C z_k with z⁺ = ``advance(z, u)``, shapes as in :func:`linear`.
 
     What acts on z changes with the input here, so z itself is rolled, for ``ROLLED`` trajectories together.
@@ -71,6 +120,7 @@ def rolled(lift: Lift, advance: Advance, C: FloatArray, x0: FloatArray, u: Float
         for k in range(steps):
             z = advance(z, u[rows, k])
             x[rows, k + 1] = z @ C.T
+            progress(start * steps + (k + 1) * len(z), n * steps)
     return x
 
 

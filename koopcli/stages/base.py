@@ -118,6 +118,10 @@ class Prospect:
     name: str
     data: str = ""
     order: int | None = None
+    a_step: float = 1.5e-4
+    """Seconds for one step from states lifted afresh, however few they are."""
+    a_state: float = 0.0
+    """Seconds for each state that is moved on by one step, beside what its lifted states cost."""
 
 
 @dataclass(frozen=True)

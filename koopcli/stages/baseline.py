@@ -6,7 +6,7 @@ from koopcli.checks import build
 from koopcli.config.settings import Baseline
 from koopcli.koopman.baselines import Forecast
 from koopcli.koopman.edmd import coverage
-from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage
+from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task
 from koopcli.stages.usable import finished
 
 NAMES = {
@@ -21,6 +21,13 @@ def _run(settings: Baseline, inputs: Inputs, context: Context) -> Forecast:
     return Forecast(settings.kind, t.dt, coverage(t), t.state_channels, t.input_channels, t.plant)
 
 
+def _prospect(task: Task) -> Prospect:
+    kind = task.settings.kind
+    if kind == "linearisation":  # a Jacobian of the plant by differences, at every state
+        return Prospect(0, None, NAMES[kind], a_step=3e-3, a_state=1e-5)
+    return Prospect(0, None, NAMES[kind], a_step=5e-5)
+
+
 STAGE = Stage(
     name="baseline",
     version=1,
@@ -31,5 +38,5 @@ STAGE = Stage(
     describe=lambda f: f"{f['kind']}, fits nothing",
     check=lambda task: None,
     estimate=lambda task: Cost(0.1, 2e6),
-    predicts=lambda task: Prospect(0, None, NAMES[task.settings.kind]),
+    predicts=_prospect,
 )

@@ -12,7 +12,7 @@ from typing import Any
 
 from koopcli.blocks import blocks
 from koopcli.errors import DamagedArtefactError
-from koopcli.progress import Progress, silent
+from koopcli.progress import Progress, silent, within
 from koopcli.records import Packed
 from koopcli.stages.base import Inputs
 from koopcli.stages.recorded import content_of
@@ -21,8 +21,6 @@ from koopcli.stages.workers import Workers, check_code
 from koopcli.store import Store
 from koopcli.store.identity import data_digest
 from koopcli.store.parts import Parts
-
-FINE = 1000  # parts of a chunk that progress is told in
 
 
 @dataclass(frozen=True)
@@ -123,10 +121,7 @@ class ChunkedWork:
         return [found[chunk.i] if chunk.i in found else chunk.compute() for chunk in chunks]
 
     def _chunk(self, whole: Chunk, i: int, rows: slice, count: int) -> Chunk:
-        def inside(done: int, total: int) -> None:
-            length = rows.stop - rows.start
-            self.progress(FINE * rows.start + FINE * length * done // max(1, total), FINE * count)
-
+        inside = within(self.progress, rows.start, rows.stop, count)
         return replace(whole, i=i, start=rows.start, stop=rows.stop, progress=inside)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import math
 import os
@@ -18,6 +17,7 @@ from typing import Any, Protocol
 
 from koopcli import __version__
 from koopcli.errors import InvalidValueError
+from koopcli.parsing import parse_json
 from koopcli.store.code import SHORT, code_digest
 
 MOST = 256
@@ -212,7 +212,7 @@ class Cluster:
 
         address = self.address
         if address.endswith(".json"):
-            address = str(json.loads(Path(address).read_text(encoding="utf-8"))["address"])
+            address = str(parse_json(Path(address).read_text(encoding="utf-8"))["address"])
         socket.create_connection(get_address_host_port(address, strict=True), ANSWERS_WITHIN).close()
         return address
 

@@ -12,7 +12,7 @@ from koopcli.config.settings import Evaluate
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.evaluation import Evaluation, evaluate, join, shortest_prediction
 from koopcli.koopman.predictor import check_horizon
-from koopcli.progress import Progress
+from koopcli.progress import Progress, within
 from koopcli.records import Meta, Packed
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
 from koopcli.stages.makers import prospect
@@ -54,12 +54,17 @@ def _chunk(settings: Evaluate, inputs: Inputs, rows: slice, progress: Progress) 
     trajectories = inputs["trajectories"].finished()
     assert settings.first is not None, "settled from the plant"
     found = []
-    for block in blocks(rows, max(1, SAMPLES // trajectories.steps)):
+    for block in blocks(rows, _together(trajectories.steps)):
+        part = within(progress, block.start - rows.start, block.stop - rows.start, rows.stop - rows.start)
         found.append(
-            evaluate(inputs["predictor"], trajectories, block, settings.first, settings.restart, settings.relift)
+            evaluate(inputs["predictor"], trajectories, block, settings.first, settings.restart, settings.relift, part)
         )
-        progress(block.stop - rows.start, rows.stop - rows.start)
     return join(found).pack()
+
+
+def _together(steps: int) -> int:
+    """How many trajectories are scored at once."""
+    return max(1, SAMPLES // steps)
 
 
 def _differing(one: Meta, other: Meta) -> list[str]:
@@ -100,17 +105,20 @@ def _check(task: Task) -> None:
         what = "the shortest prediction" if restart else "the test set"
         raise InvalidValueError(f"'evaluate.first' must be at most the {shortest} steps of {what}")
     test = task.input("trajectories").find("sample")
-    rows = min(task.settings.chunk, test.settings.trajectories) if test is not None else task.settings.chunk
+    rows = min(task.settings.chunk, _together(steps))
+    if test is not None:
+        rows = min(rows, test.settings.trajectories)
     refuse_beyond_memory("a chunk", 24.0 * rows * prospect(task.input("predictor")).functions, "evaluate.chunk")
 
 
 def _estimate(task: Task) -> Cost:
-    test = task.input("trajectories")
-    samples = test.ancestor("sample").settings.trajectories * test.settings.steps
-    return Cost(
-        6e-9 * samples * (prospect(task.input("predictor")).functions + 100),
-        130.0 * test.ancestor("sample").settings.trajectories,
-    )
+    test, settings = task.input("trajectories"), task.settings
+    n, steps = test.ancestor("sample").settings.trajectories, test.settings.steps
+    about, kinds = prospect(task.input("predictor")), 1 + settings.relift
+    turns = steps * -(-n // min(settings.chunk, _together(steps)))
+    seconds = settings.relift * turns * about.a_step
+    seconds += n * steps * (6e-9 * (about.functions + 100) + kinds * about.a_state)
+    return Cost(seconds, 13e3 + 115.0 * n * -(-steps // (settings.restart or steps)))
 
 
 STAGE = Stage(

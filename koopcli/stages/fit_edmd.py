@@ -29,6 +29,7 @@ from koopcli.vehicles.plants import PLANTS
 
 TERMS_LIMIT = 4096  # coefficients of one lifted state
 HARMLESS = 1e14  # a condition number that leaves two digits
+ROLLED = {"linear": 0, "bilinear": 1, "generator": 10}  # about how many products with every matrix a step takes
 OF_ONE_RUN = ("steps", "chunk", "reference")  # settings of a simulation that make it no other plant
 
 
@@ -123,7 +124,8 @@ def _prospect(task: Task) -> Prospect:
     if settings.terms != "linear":
         name = f"bilinear {name}" if settings.terms == "bilinear" else f"bilinear {name}, generator"
     order = settings.order if "order" in OF_BASIS[settings.basis] else None
-    return Prospect(_functions(task), None, name, about, order)
+    rolling = 2.5e-10 * _functions(task) * _terms(task) * ROLLED[settings.terms]
+    return Prospect(_functions(task), None, name, about, order, a_state=rolling)
 
 
 NAMES = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,6 +17,7 @@ from koopcli.errors import (
     UnknownNameError,
     UsageError,
 )
+from koopcli.parsing import parse_json
 from koopcli.records import Packed
 from koopcli.stages.base import Reporter, Task
 from koopcli.stages.pipeline import Pipeline
@@ -104,7 +104,7 @@ def _still_damaged(path: Path) -> bool:
 def _recipe(path: Path) -> dict[str, Any] | None:
     """The recipe in a damaged record, if it hashes to the record's name."""
     try:
-        recipe = json.loads(read_small(path))["recipe"]
+        recipe = parse_json(read_small(path))["recipe"]
         good = key_of(recipe) == path.stem and recipe["stage"] == path.parent.name and recipe["stage"] in STAGES
         return dict(recipe) if good else None
     except (
@@ -114,7 +114,6 @@ def _recipe(path: Path) -> dict[str, Any] | None:
         KeyError,
         TypeError,
         AttributeError,
-        RecursionError,
         InvalidValueError,
     ):
         return None

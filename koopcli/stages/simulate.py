@@ -20,6 +20,7 @@ from koopcli.vehicles.options import OPTIONS, Options
 from koopcli.vehicles.plants import PLANTS, Plant
 
 SECONDS_A_STEP = {"forces": 3e-7, "slips": 1e-5, "wheels": 3e-5}
+A_STEP = 3e-4  # seconds for one step of a chunk, however few its trajectories are
 REFERENCE_STEP = 3e-3
 COURSE_BYTES = 24.0  # held of every trajectory; states and inputs are on disk, but for a chunk of them
 SLOWER = 100  # by so much are chunks of the reference solver smaller
@@ -137,7 +138,8 @@ def _estimate(task: Task) -> Cost:
         each *= max(1.0, task.settings.dt / 0.01)  # stiff: a longer step is walked through in more
     if task.settings.reference:
         each = REFERENCE_STEP
-    return Cost(each * n * steps, n * _row_bytes(task.settings))
+    turns = steps * -(-n // _rows(task.settings))
+    return Cost(each * n * steps + A_STEP * turns, n * _row_bytes(task.settings))
 
 
 def _row_bytes(settings: Simulate) -> float:

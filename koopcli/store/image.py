@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 
 from koopcli.errors import InvalidValueError
+from koopcli.parsing import TooDeepError, parse_json
 from koopcli.records import Array, Packed
 from koopcli.store.files import UntrustedFileError, open_regular, refuse_without_room, write_at
 from koopcli.store.identity import canonical, plain, slabs
@@ -175,9 +176,11 @@ def _packed(file: h5py.File, texts: Texts, limit: int = LARGEST) -> Packed:
             refuse(f"'{path}' holds something between true and false")  # which numpy would count wrongly
         arrays[path] = array
     try:
-        meta = json.loads(texts.of(h5py.h5o.get_info(file.id).addr).get("meta", ""))
-        canonical(meta)  # finite, of Unicode and not too deep
-    except (ValueError, RecursionError, InvalidValueError):
+        meta = parse_json(texts.of(h5py.h5o.get_info(file.id).addr).get("meta", ""))
+        canonical(meta)  # finite and of Unicode
+    except TooDeepError as error:
+        refuse(f"its facts are {error}")
+    except (ValueError, InvalidValueError):
         meta = None
     if not isinstance(meta, dict):
         refuse("its facts are not a JSON object")

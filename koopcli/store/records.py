@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from koopcli.errors import InvalidValueError, NewerFormatError
+from koopcli.parsing import parse_json
 from koopcli.store.identity import SCHEMA, canonical, key_of
 from koopcli.store.names import DIGEST, SHORT, is_name
 
@@ -60,9 +61,9 @@ class Record:
         Raises ``BadRecordError`` for a damaged record and ``NewerFormatError`` for one of a newer schema.
         """
         try:
-            content = json.loads(text)
+            content = parse_json(text)
             schema = content["schema"]
-        except (ValueError, KeyError, TypeError, RecursionError) as error:
+        except (ValueError, KeyError, TypeError) as error:
             raise BadRecordError from error
         if isinstance(schema, int) and schema > SCHEMA:
             raise NewerFormatError(
@@ -76,7 +77,7 @@ class Record:
             record = cls(**content)
             if not _well_formed(record) or (record.stage, record.key) != (stage, key):
                 raise BadRecordError
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError, InvalidValueError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, InvalidValueError) as error:
             raise BadRecordError from error
         return record
 

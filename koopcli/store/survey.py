@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections.abc import Iterator
@@ -10,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from koopcli.errors import NewerFormatError
+from koopcli.parsing import parse_json
 from koopcli.progress import Progress, silent
 from koopcli.store.files import UntrustedFileError, read_small, reading_errors
 from koopcli.store.names import STAGE, is_name
@@ -161,9 +161,9 @@ def pinned(root: Path, foreign: list[File] | None = None) -> dict[str, list[str]
 
 def _pin(path: Path) -> list[str] | None:
     try:
-        names = json.loads(read_small(path))["names"]
+        names = parse_json(read_small(path))["names"]
         return names if isinstance(names, list) and all(map(is_name, names)) else None
-    except (OSError, UntrustedFileError, ValueError, KeyError, TypeError, RecursionError):
+    except (OSError, UntrustedFileError, ValueError, KeyError, TypeError):
         return None
 
 

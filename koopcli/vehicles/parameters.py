@@ -10,6 +10,7 @@ from typing import Any
 
 from koopcli.checks import Origin, build, candidates, from_file, setting
 from koopcli.errors import InvalidValueError
+from koopcli.parsing import parse_toml
 from koopcli.text import read_text
 
 
@@ -84,10 +85,10 @@ def read_vehicle_file(path: Path) -> VehicleFile:
     """
     here = from_file(path)
     try:
-        content = tomllib.loads(read_text(path))
+        content = parse_toml(read_text(path))
     except tomllib.TOMLDecodeError as error:
         raise InvalidValueError(here.say(f"not valid TOML: {error}")) from error
-    except (OSError, ValueError, RecursionError) as error:
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InvalidValueError(here.say(f"cannot read the vehicle file: {reason}")) from error
     known = ("title", "source", "parameters", *TYRES)

@@ -187,3 +187,16 @@ def test_diverged_and_undefined_rows_stay_out_of_every_figure(pair):
     assert figures["rmse"]["max"] == np.sort(scored.rmse)[-2]
     near = replace(scored, diverged=lost, distance=scored.rmse).figures()
     assert near["worst_in_emptiest"] == 1.0
+
+
+def test_progress_moves_within_one_prediction(pair):
+    """One long trajectory is one row: without steps in between its bar would stand still until the end."""
+    predictor, test = pair
+    bilinear = replace(predictor, N=np.zeros((4, 64, 64)))
+    for one, halves in ((predictor, 1), (bilinear, 2)):
+        told = []
+        part = replace(test, x=test.x[:1], u=test.u[:1])
+        evaluate(one, part, slice(None), 1, progress=lambda done, total, told=told: told.append(done / total))
+        assert told == sorted(told)
+        assert told[-1] == 1
+        assert len(set(told)) >= 8 * halves

@@ -246,6 +246,14 @@ def test_where_nothing_listens_is_said_at_once(tmp_path, address):
     assert time.monotonic() - begun < 0.9 * engines.ANSWERS_WITHIN
 
 
+def test_a_scheduler_file_that_is_too_deep_is_no_scheduler(tmp_path):
+    pytest.importorskip("distributed")
+    file = tmp_path / "scheduler.json"
+    file.write_text('{"address": "tcp://127.0.0.1:1", "more": ' + "[" * 100_000 + "]" * 100_000 + "}")
+    with pytest.raises(InvalidValueError, match="no Dask scheduler answers there"):
+        Workers(cluster=str(file)).begin(tmp_path)
+
+
 def test_without_the_extra_it_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InvalidValueError, match=r"pip install 'koopcli\[dask\]'"):

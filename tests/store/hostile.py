@@ -21,6 +21,7 @@ Make = Callable[[h5py.File, Path], None]
 CASES: dict[str, tuple[Make, str]] = {}
 RAW: dict[str, tuple[Callable[[bytes], bytes], str]] = {}
 LENGTH = 64  # bytes of the secret
+DEEP = "facts are nested over 64 levels deep"
 FOREIGN = "in another file|link to elsewhere"
 
 
@@ -407,20 +408,20 @@ def escape_in_the_units(file, secret):
     file["x"].attrs["units"] = "\x1b]0;evil\x07"
 
 
-def _meta(name: str, text: str | None) -> None:
+def _meta(name: str, text: str | None, reason: str = "facts are not a JSON object") -> None:
     def change(file, secret):
         del file.attrs["meta"]
         if text is not None:
             file.attrs["meta"] = text
 
-    CASES[name] = change, "facts are not a JSON object"
+    CASES[name] = change, reason
 
 
 _meta("no_facts", None)
 _meta("facts_that_are_a_list", "[]")
 _meta("facts_that_are_no_json", "{")
-_meta("facts_without_end", '{"a":' + "[" * 100_000 + "]" * 100_000 + "}")
-_meta("facts_too_deep_to_hash", '{"a":' + "[" * 900 + "]" * 900 + "}")
+_meta("facts_without_end", '{"a":' + "[" * 100_000 + "]" * 100_000 + "}", DEEP)
+_meta("facts_too_deep", '{"a":' + "[" * 64 + "]" * 64 + "}", DEEP)
 _meta("facts_not_a_number", '{"a": NaN}')
 _meta("facts_of_half_a_character", '{"a": "\\ud800"}')
 
