@@ -19,6 +19,7 @@ from typing import NamedTuple
 from koopcli.errors import DamagedArtefactError, StorageError
 
 HOUR, DAY = 3600.0, 86400.0
+PIECE = 16 << 20  # bytes read and written at a time
 JSON_LIMIT = 16 << 20  # bytes of a record or a pin
 
 
@@ -160,6 +161,15 @@ def write_at(descriptor: int, content: memoryview, place: int) -> None:
     while content:
         written = os.pwrite(descriptor, content, place)
         content, place = content[written:], place + written
+
+
+def reserve(descriptor: int, size: int) -> None:
+    """Take the disk's space for a file of ``size`` bytes that has holes; what it holds stays as it is."""
+    if hasattr(os, "posix_fallocate"):
+        os.posix_fallocate(descriptor, 0, size)
+        return
+    for place in range(0, size, PIECE):  # macOS lacks that call: the zeros that a hole reads as are written
+        write_at(descriptor, memoryview(os.pread(descriptor, min(PIECE, size - place), place)), place)
 
 
 def refuse_without_room(path: Path, needed: float) -> None:
