@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from koopcli.errors import InvalidValueError, KoopError, StorageError
 from koopcli.interrupts import TERMINATED, interruptible
+from koopcli.paths import require_posix
 
 RESUME = "interrupted: nothing committed is lost; run the same command again to resume"
 INTERRUPTED = 130
@@ -17,10 +18,13 @@ BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     try:
+        require_posix()
         with interruptible():
             _streams()
             for name in BLAS_THREADS:  # read when numpy is first imported, here and in workers
                 os.environ.setdefault(name, "1")
+            if os.path.expanduser("~") == "~":  # without a home matplotlib below 3.11 fails, and nothing but it asks
+                os.environ.setdefault("MPLCONFIGDIR", os.devnull)  # no folder: it makes one and removes it
             code = _run(argv)
             sys.stdout.flush()
     except KoopError as error:

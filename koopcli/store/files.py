@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from koopcli.errors import DamagedArtefactError, StorageError
+from koopcli.store.remedies import FULL, remedy
 
 HOUR, DAY = 3600.0, 86400.0
 PIECE = 16 << 20  # bytes read and written at a time
@@ -34,15 +35,15 @@ def printable(text: str) -> str:
 
 @contextmanager
 def storage_errors(path: Path, needed: float = 0) -> Iterator[None]:
-    """Turn an ``OSError`` of writing to ``path`` into one line: what failed, what was needed and what is free."""
+    """Turn an ``OSError`` of writing to ``path`` into one line: what failed and what to do.
+
+    On a full disk, that includes what was ``needed`` and what is free.
+    """
     try:
         yield
     except OSError as error:
-        room = f"{size_text(needed)} needed, {size_text(_free(path))} free"
-        raise StorageError(
-            f"cannot write to the store at {path}: {_reason(error)} ({room}); free some space or choose another "
-            "with --store"
-        ) from error
+        room = f" ({size_text(needed)} needed, {size_text(_free(path))} free)" if error.errno in FULL else ""
+        raise StorageError(f"cannot write to the store at {path}: {_reason(error)}{room}; {remedy(error)}") from error
 
 
 @contextmanager
@@ -53,9 +54,7 @@ def reading_errors(path: Path) -> Iterator[None]:
     except FileNotFoundError:
         raise
     except OSError as error:
-        raise StorageError(
-            f"cannot read {path}: {_reason(error)}; mend its permissions or choose another with --store"
-        ) from error
+        raise StorageError(f"cannot read {path}: {_reason(error)}; {remedy(error)}") from error
 
 
 def _reason(error: OSError) -> str:
