@@ -2,10 +2,12 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+RESOLUTION ?=
 KOOP := $(BIN)/koop
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce reproduce-edmd reproduce-eigen reproduce-beyond smoke test test-all check docs pins bench peers scaling faults kernels \
+.PHONY: help reproduce reproduce-edmd reproduce-eigen reproduce-beyond smoke test test-all test-lowest test-newest check \
+  docs pins bench peers scaling faults kernels \
   traps wheel clean
 
 help: ## Show this help
@@ -33,6 +35,12 @@ test: $(VENV)/.developing ## Run the tests, on every core (four minutes on two)
 
 test-all: $(VENV)/.developing ## Run the slow tests too
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal -m ''
+
+test-lowest: ## Run the tests with the lowest version allowed of every dependency (for Python 3.11, which has them all)
+	$(MAKE) VENV=.venv-lowest RESOLUTION=lowest-direct test
+
+test-newest: ## Run the tests and the checks with the newest version of every dependency
+	$(MAKE) VENV=.venv-newest RESOLUTION=highest test check
 
 check: $(VENV)/.developing ## Lint, types and the direction of imports
 	$(BIN)/ruff format --check .
@@ -70,7 +78,7 @@ wheel: $(VENV)/.developing ## Build the wheel into dist/
 	$(BIN)/python -m build --wheel --outdir dist
 
 clean: ## Remove the environment and build leftovers, but no artefacts
-	rm -rf $(VENV) .venv-peers dist build .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) .venv-lowest .venv-newest .venv-peers dist build .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find koopcli tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.created:
@@ -88,5 +96,6 @@ $(VENV)/.installed: pyproject.toml | $(VENV)/.created
 	@touch $@
 
 $(VENV)/.developing: pyproject.toml | $(VENV)/.created
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(RESOLUTION),uv,-e '.[dev]')
+	$(if $(RESOLUTION),$(BIN)/uv pip install --quiet --upgrade --python $(BIN) --resolution $(RESOLUTION) -e '.[dev]')
 	@touch $@ $(VENV)/.installed

@@ -19,6 +19,9 @@ def load(name: str, store: str | Path | None = None) -> Any:
     The store is ``store``, else ``$KOOP_STORE``, else ``./artefacts``; every byte is verified. Raises
     ``UnknownNameError`` for an unknown or ambiguous name, ``DamagedArtefactError`` for a damaged object.
     """
+    from koopcli.paths import require_posix  # noqa: PLC0415
+
+    require_posix()
     from koopcli.stages import read  # noqa: PLC0415  (numpy and h5py only when asked for)
 
     return read(name, store)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 
 from koopcli.errors import InvalidValueError, KoopError, StorageError
 from koopcli.interrupts import TERMINATED, interruptible
+from koopcli.paths import require_posix
 from koopcli.streams import unstoppable
 from koopcli.text import one_line
 
@@ -26,6 +27,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _answer(work: Callable[[], int]) -> int:
     """The exit code of ``work``, after one line for what went wrong."""
     try:
+        require_posix()
         with interruptible():
             code = work()
     except KoopError as error:
@@ -50,6 +52,8 @@ def _answer(work: Callable[[], int]) -> int:
 def _run(argv: Sequence[str] | None) -> int:
     for name in BLAS_THREADS:  # read when numpy is first imported, here and in workers
         os.environ.setdefault(name, "1")
+    if os.path.expanduser("~") == "~":  # without a home matplotlib below 3.11 fails, and nothing but it asks
+        os.environ.setdefault("MPLCONFIGDIR", os.devnull)  # no folder: it makes one and removes it
     import typer  # noqa: PLC0415  (inside, so that Ctrl-C while it loads is answered too)
 
     from koopcli.cli.app import app  # noqa: PLC0415

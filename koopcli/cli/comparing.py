@@ -75,7 +75,7 @@ def _open(text: str, shelf: Store, console: Console) -> tuple[str, Record | None
     from koopcli.stages.pipeline import Pipeline
     from koopcli.store.image import read_foreign
 
-    if text.endswith(".h5") or Path(text).is_file():
+    if text.endswith(".h5") or _is_file(text):
         return text, None, read_foreign(Path(text))
     record = shelf.find(text)
     try:
@@ -85,6 +85,16 @@ def _open(text: str, shelf: Store, console: Console) -> tuple[str, Record | None
         pipeline = Pipeline(shelf, console)
         record = pipeline.make(pipeline.named(f"{record.stage}/{record.key}")).record
         return record.name, record, shelf.read(record)
+
+
+def _is_file(text: str) -> bool:
+    """Whether ``text`` is the path of a file, or of something that cannot be looked at: reading it says why."""
+    from koopcli.paths import is_file
+
+    try:
+        return is_file(Path(text))
+    except OSError:
+        return True
 
 
 def _settings(a: Record, b: Record, shelf: Store) -> Pairs:

@@ -14,6 +14,7 @@ from koopcli.cli.invocation import write_csv
 from koopcli.config.pictures import ImageFormat
 from koopcli.console import Console
 from koopcli.errors import InvalidValueError, StorageError, UsageError
+from koopcli.paths import is_file, is_folder
 
 OutputOption = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="FILE", help="Write the image: .png, .svg or .pdf.")
@@ -43,8 +44,8 @@ def check_outputs(output: Path | None, csv: Path | None, *, as_json: bool) -> No
     if output is not None and csv is not None and output.resolve() == csv.resolve():
         raise UsageError(f"{output} cannot be both the image and its numbers: name two files")
     for path in (output, None if csv == STDOUT else csv):
-        if path is not None and (path.is_dir() or not os.access(path if _in_place(path) else path.parent, os.W_OK)):
-            raise StorageError(f"cannot write {path}: name a file in a folder that can be written to")
+        if path is not None:
+            _check(path)
 
 
 def write_outputs(console: Console, image: bytes, output: Path | None, content: Any, csv: Path | None) -> None:
@@ -61,13 +62,24 @@ def write_outputs(console: Console, image: bytes, output: Path | None, content: 
         console.note(f"wrote {csv}")
 
 
+def _check(path: Path) -> None:
+    try:
+        writable = not is_folder(path) and os.access(path if _in_place(path) else path.parent, os.W_OK)
+    except OSError as error:
+        raise _refused(path, error) from error
+    if not writable:
+        raise StorageError(f"cannot write {path}: name a file in a folder that can be written to")
+
+
 def _in_place(path: Path) -> bool:
     """Whether ``path`` must be written where it is: a device, a pipe, or a link that stays one."""
-    return path.exists() and (path.is_symlink() or not path.is_file())
+    return path.exists() and (path.is_symlink() or not is_file(path))
 
 
 def _write(path: Path, content: bytes) -> None:
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    from koopcli.store.files import own_name
+
+    beside = path.with_name(f".{own_name()}")  # the file's own name may leave no room for more
     try:
         if _in_place(path):
             path.write_bytes(content)
@@ -75,6 +87,12 @@ def _write(path: Path, content: bytes) -> None:
         beside.write_bytes(content)
         os.replace(beside, path)
     except OSError as error:
-        raise StorageError(f"cannot write {path}: {error.strerror}") from error
+        raise _refused(path, error) from error
     finally:
         beside.unlink(missing_ok=True)
+
+
+def _refused(path: Path, error: OSError) -> StorageError:
+    from koopcli.store.remedies import remedy
+
+    return StorageError(f"cannot write {path}: {error.strerror}; {remedy(error, 'name another file')}")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from koopcli.checks import candidates
 from koopcli.errors import InvalidValueError, UnknownNameError
+from koopcli.paths import is_file
 
 
 def data_folder() -> Path:
@@ -24,7 +25,7 @@ def locate(folder: str, name: str, what: str, relative_to: Path = Path()) -> Pat
     if name.endswith(".toml") or "/" in name:
         try:
             path = relative_to / Path(name).expanduser()
-            found = path.is_file()
+            found = is_file(path)
         except (OSError, RuntimeError, ValueError) as error:
             raise InvalidValueError(f"{name}: cannot read the {what} file: {error}") from error
         if not found:

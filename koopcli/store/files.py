@@ -17,8 +17,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from koopcli.errors import DamagedArtefactError, StorageError
+from koopcli.store.remedies import FULL, remedy
 
 HOUR, DAY = 3600.0, 86400.0
+PIECE = 16 << 20  # bytes read and written at a time
 JSON_LIMIT = 16 << 20  # bytes of a record or a pin
 
 
@@ -28,15 +30,15 @@ class UntrustedFileError(DamagedArtefactError):
 
 @contextmanager
 def storage_errors(path: Path, needed: float = 0) -> Iterator[None]:
-    """Turn an ``OSError`` of writing to ``path`` into one line: what failed, what was needed and what is free."""
+    """Turn an ``OSError`` of writing to ``path`` into one line: what failed and what to do.
+
+    On a full disk, that includes what was ``needed`` and what is free.
+    """
     try:
         yield
     except OSError as error:
-        room = f"{size_text(needed)} needed, {size_text(_free(path))} free"
-        raise StorageError(
-            f"cannot write to the store at {path}: {_reason(error)} ({room}); free some space or choose another "
-            "with --store"
-        ) from error
+        room = f" ({size_text(needed)} needed, {size_text(_free(path))} free)" if error.errno in FULL else ""
+        raise StorageError(f"cannot write to the store at {path}: {_reason(error)}{room}; {remedy(error)}") from error
 
 
 @contextmanager
@@ -47,9 +49,7 @@ def reading_errors(path: Path) -> Iterator[None]:
     except FileNotFoundError:
         raise
     except OSError as error:
-        raise StorageError(
-            f"cannot read {path}: {_reason(error)}; mend its permissions or choose another with --store"
-        ) from error
+        raise StorageError(f"cannot read {path}: {_reason(error)}; {remedy(error)}") from error
 
 
 def _reason(error: OSError) -> str:
@@ -155,6 +155,15 @@ def write_at(descriptor: int, content: memoryview, place: int) -> None:
     while content:
         written = os.pwrite(descriptor, content, place)
         content, place = content[written:], place + written
+
+
+def reserve(descriptor: int, size: int) -> None:
+    """Take the disk's space for a file of ``size`` bytes that has holes; what it holds stays as it is."""
+    if hasattr(os, "posix_fallocate"):
+        os.posix_fallocate(descriptor, 0, size)
+        return
+    for place in range(0, size, PIECE):  # macOS lacks that call: the zeros that a hole reads as are written
+        write_at(descriptor, memoryview(os.pread(descriptor, min(PIECE, size - place), place)), place)
 
 
 def refuse_without_room(path: Path, needed: float) -> None:

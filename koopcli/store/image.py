@@ -11,21 +11,24 @@ import mmap
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import h5py
 import numpy as np
+from h5py import h5d, h5f, h5g, h5o, h5p
 
 from koopcli.errors import InvalidValueError
 from koopcli.parsing import TooDeepError, parse_json
 from koopcli.records import Array, Packed
-from koopcli.store.files import UntrustedFileError, open_regular, refuse_without_room, write_at
+from koopcli.store.files import UntrustedFileError, open_regular, own_name, refuse_without_room, reserve, write_at
 from koopcli.store.identity import canonical, plain, slabs
+from koopcli.store.superblock import mended
 from koopcli.store.texts import Texts
 from koopcli.store.walk import LARGEST, refusals, refuse, walk
 from koopcli.text import printable
 
+MEMORY_BLOCK = 1 << 16  # bytes by which an image in memory grows
 IMAGE_LIMIT = 32 << 20  # bytes that are laid out in memory, which takes several times as many
 MEMORY_LIMIT = 256 << 20  # bytes that are read as a whole
 IN_MEMORY = 4 * MEMORY_LIMIT  # bytes that an image in memory may unpack to
@@ -40,11 +43,13 @@ def data_bytes(packed: Packed) -> int:
 
 def to_bytes(packed: Packed) -> bytes:
     """The HDF5 image; the same record gives the same bytes."""
-    with h5py.File.in_memory(libver=("v110", "v110")) as file:
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_fapl_core(MEMORY_BLOCK, False)
+    with _created(own_name(), access) as file:
         for dataset, array in _laid_out(file, packed):
             dataset[...] = array.values[...]
         file.flush()
-        return bytes(file.id.get_file_image())
+        return mended(file.id.get_file_image())
 
 
 def to_file(packed: Packed, path: Path) -> None:
@@ -53,11 +58,13 @@ def to_file(packed: Packed, path: Path) -> None:
     The space is reserved before the first value, and the values are written to their places by plain system calls.
     """
     refuse_without_room(path, data_bytes(packed))
-    with h5py.File(path, "x", libver=("v110", "v110"), locking=False) as file:
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_file_locking(False, True)
+    with _created(path, access) as file:
         places = [(dataset.id.get_offset(), array) for dataset, array in _laid_out(file, packed)]
     descriptor = os.open(path, os.O_RDWR)
     try:
-        os.posix_fallocate(descriptor, 0, os.fstat(descriptor).st_size)
+        reserve(descriptor, os.fstat(descriptor).st_size)
         for start, array in places:
             place = start
             for slab in slabs(array.values):
@@ -144,13 +151,29 @@ class _OnDisk:
             return file[self.name][index]
 
 
+def _created(name: str | Path, access: Any) -> h5py.File:
+    """A new file of format 1.10. No object in it keeps when it was made: the same record gives the same bytes."""
+    access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
+    access.set_fclose_degree(h5f.CLOSE_STRONG)
+    return h5py.File(h5f.create(os.fsencode(name), h5f.ACC_EXCL, fcpl=_timeless(h5p.FILE_CREATE), fapl=access))
+
+
+def _timeless(kind: Any) -> Any:
+    """How to create an object of ``kind`` that does not keep when it was made."""
+    how = h5p.create(kind)
+    how.set_obj_track_times(False)
+    return how
+
+
 def _laid_out(file: h5py.File, packed: Packed) -> Iterator[tuple[h5py.Dataset, Array]]:
     """Every array's dataset, with its attributes and without its values."""
     file.attrs["meta"] = json.dumps(plain(packed.meta), sort_keys=True)
-    layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    layout.set_layout(h5py.h5d.CONTIGUOUS)
-    layout.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+    layout = _timeless(h5p.DATASET_CREATE)
+    layout.set_layout(h5d.CONTIGUOUS)
+    layout.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+    layout.set_fill_time(h5d.FILL_TIME_NEVER)
+    for group in sorted({str(parent) for path in packed.arrays for parent in PurePosixPath(path).parents} - {"."}):
+        h5g.create(file.id, group.encode(), gcpl=_timeless(h5p.GROUP_CREATE))
     for path, array in sorted(packed.arrays.items()):
         dataset = file.create_dataset(path, shape=array.values.shape, dtype=_stored(array), dcpl=layout.copy())
         dataset.attrs["units"] = array.units
@@ -167,7 +190,7 @@ def _packed(file: h5py.File, texts: Texts, limit: int = LARGEST) -> Packed:
     """The record of an open file that has passed the walk; its arrays are the file's own datasets."""
     arrays: dict[str, Array] = {}
     for path, dataset in walk(file, limit).items():
-        beside = texts.of(h5py.h5o.get_info(dataset.id).addr)
+        beside = texts.of(h5o.get_info(dataset.id).addr)
         axes, units = beside.get("axes", "\0"), beside.get("units", "\0")
         array = Array(dataset, tuple(axes.split(", ")), units)
         if not (axes + units).isprintable() or len(array.axes) != len(dataset.shape):
@@ -176,7 +199,7 @@ def _packed(file: h5py.File, texts: Texts, limit: int = LARGEST) -> Packed:
             refuse(f"'{path}' holds something between true and false")  # which numpy would count wrongly
         arrays[path] = array
     try:
-        meta = parse_json(texts.of(h5py.h5o.get_info(file.id).addr).get("meta", ""))
+        meta = parse_json(texts.of(h5o.get_info(file.id).addr).get("meta", ""))
         canonical(meta)  # finite and of Unicode
     except TooDeepError as error:
         refuse(f"its facts are {error}")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -18,6 +19,7 @@ from koopcli.errors import (
     StorageError,
     UnknownNameError,
 )
+from koopcli.paths import is_folder
 from koopcli.records import Packed
 from koopcli.store import image
 from koopcli.store.files import (
@@ -51,7 +53,7 @@ class Store:
         self.warn = warn
         self._swept = False
         with reading_errors(root):
-            if not root.is_dir() and (root.exists() or root.is_symlink()):
+            if not is_folder(root) and os.path.lexists(root):
                 raise StorageError(f"the store {root} is not a folder, or a link to none: choose another with --store")
 
     # reading
@@ -108,9 +110,11 @@ class Store:
 
     def has_object(self, record: Record) -> bool:
         """Whether the object is there, as a file and not a link; a record without its object is a miss."""
-        path = self.path(record)
-        with reading_errors(self.root):
-            return path.is_file() and not path.is_symlink()
+        try:
+            with reading_errors(self.root):
+                return stat.S_ISREG(self.path(record).lstat().st_mode)
+        except FileNotFoundError:
+            return False
 
     def read(self, record: Record) -> Packed:
         """The verified content. Raises ``DamagedArtefactError`` after putting a damaged object aside."""

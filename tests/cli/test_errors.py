@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import json
 import os
+import subprocess
+import sys
 
 import pytest
 from filelock import FileLock
@@ -107,7 +109,16 @@ def one_line(result, code, *parts):
         (["simulate", "--vehicle", "~nouser/x.toml"], 3, "~nouser/x.toml"),
         (["simulate", "--vehicle", "x" * 300 + ".toml"], 3, "File name too long"),
         (["sample", "--store", "~nouser/x"], 6, "~nouser/x"),
-        (["sample", "--store", "x" * 300], 6, "File name too long"),
+        (["sample", "--store", "x" * 300], 6, "; give it a shorter path, or choose another store"),
+        (["ls", "--store", "x" * 300], 6, "File name too long"),
+        (["vehicle", "show", "x" * 300 + ".toml"], 3, "File name too long"),
+        (["diff", "x" * 300, "y"], 3, "File name too long"),
+        (
+            ["plot", "orders", "-o", "x" * 300 + ".png"],
+            6,
+            "File name too long; give it a shorter path, or name another",
+        ),
+        (["plot", "orders", "--csv", "x" * 300], 6, "File name too long"),
         (["sample", "grid", "--count", "0"], 3, "'sample.count' must be at least 1"),
         (["sample", "box", "--amplitude", "nan"], 3, "'sample.amplitude' must be a finite number"),
         (["sample", "box", "--amplitude", "-1"], 3, "'sample.amplitude' must be at least 0"),
@@ -245,8 +256,18 @@ def test_a_damaged_record_is_put_aside(koop, folder):
     assert "damaged and was put aside" in again.err
 
 
-@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS, errno.EACCES])
-def test_storage_that_fails(koop, folder, monkeypatch, code):
+@pytest.mark.parametrize(
+    ("code", "part"),
+    [
+        (errno.ENOSPC, " free); free some space, or choose another store with --store"),
+        (errno.EDQUOT, " free); remove files of yours: they fill your quota, or"),
+        (errno.EROFS, "Read-only file system; mount it for writing, or"),
+        (errno.EACCES, "Permission denied; change its permissions, or"),
+        (errno.EIO, "; look after its disk or its server, or"),
+        (errno.EBADF, "Bad file descriptor; choose another store with --store"),
+    ],
+)
+def test_storage_that_fails(koop, folder, monkeypatch, code, part):
     real = os.open
 
     def failing(path, flags, *args, **kwargs):
@@ -255,7 +276,7 @@ def test_storage_that_fails(koop, folder, monkeypatch, code):
         return real(path, flags, *args, **kwargs)
 
     monkeypatch.setattr(os, "open", failing)
-    one_line(koop("sample"), 6, os.strerror(code), "needed", "free", "--store")
+    one_line(koop("sample"), 6, os.strerror(code), part)
     assert not list((folder / "artefacts" / "tmp").iterdir())
 
 
@@ -276,7 +297,26 @@ def test_an_unwritable_picture(koop, folder):
     assert not (folder / "artefacts").exists()
     (folder / "x.png").mkdir()
     one_line(koop("plot", "orders", "-o", "x.png"), 6, "x.png")
-    assert list(folder.glob(".x.png*")) == []
+    assert [path.name for path in folder.iterdir()] == ["x.png"]
+
+
+def test_a_picture_whose_name_is_as_long_as_a_name_can_be(koop, folder):
+    name = "x" * 251 + ".png"
+    assert koop("plot", "tyre", "-o", name).code == 0
+    assert (folder / name).exists()
+
+
+def test_windows_gets_one_sentence(folder):
+    """Before a module is imported that Windows does not have."""
+    lacking = "import os, sys, pathlib; sys.modules.update(fcntl=None, resource=None); os.name = 'nt'; import koopcli"
+    calls = {
+        "from koopcli.__main__ import main; sys.exit(main(['sample']))": "koop: ",
+        "koopcli.load('sample')": "Error: ",
+    }
+    for call, before in calls.items():
+        done = subprocess.run([sys.executable, "-c", f"{lacking}; {call}"], capture_output=True, text=True, check=False)
+        assert done.returncode != 0
+        assert f"{before}koop needs the files and locks of Linux or macOS: on Windows, run it in WSL\n" in done.stderr
 
 
 def test_a_store_that_is_a_file(koop, folder):
@@ -359,7 +399,9 @@ def test_what_cannot_be_read_is_named(koop, folder, monkeypatch):
         return real(path, *args, **kwargs)
 
     monkeypatch.setattr(os, "open", refuse)
-    one_line(koop("show", name), 6, "cannot read", "Permission denied", ".h5")
+    one_line(
+        koop("show", name), 6, "cannot read", "Permission denied", ".h5; change its permissions, or choose another"
+    )
 
 
 def test_an_internal_error_is_the_only_traceback(monkeypatch, folder):

@@ -216,6 +216,15 @@ def test_a_held_lock_times_out(store, monkeypatch):
         pass
 
 
+def test_a_lock_is_for_those_whom_the_umask_lets_in(store):
+    before = os.umask(0o002)
+    try:
+        with store.lock("abc", "sample/abc"):
+            assert (store.root / "locks" / "abc.lock").stat().st_mode & 0o777 == 0o664
+    finally:
+        os.umask(before)
+
+
 @pytest.mark.parametrize("error", [NotImplementedError(), OSError(errno.ENOLCK, "No locks available")])
 def test_a_file_system_without_locks_is_a_warning(store, monkeypatch, error):
     def refuse(self, *args, **kwargs):

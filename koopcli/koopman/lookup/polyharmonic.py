@@ -9,7 +9,7 @@ import numpy as np
 from koopcli.koopman.lookup.cloud import Cloud
 from koopcli.koopman.lookup.mls import trend_weights
 from koopcli.koopman.modes import IndexArray
-from koopcli.records import FloatArray
+from koopcli.records import BoolArray, FloatArray
 
 TOGETHER = 256  # places solved for at once
 STIFF = 1e-9  # softness of a spline that meets its nodes
@@ -54,7 +54,7 @@ def _bounded(near: FloatArray) -> FloatArray:
     return weights
 
 
-def _wild(weights: FloatArray) -> FloatArray:
+def _wild(weights: FloatArray) -> BoolArray:
     return ~np.asarray(np.abs(weights).sum(axis=1) <= LARGEST)
 
 
