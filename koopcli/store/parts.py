@@ -14,7 +14,7 @@ from koopcli.store.code import code_digest
 from koopcli.store.files import Published, UntrustedFileError, open_regular, storage_errors
 
 HELD = 64 << 20  # bytes of the chunks of one artefact that are held in memory; others are read where they are needed
-CHUNK = re.compile(r"(\d+)-([0-9a-f]{64})-([0-9a-f]{64})\.h5")
+CHUNK = re.compile(r"(\d+)-([0-9a-f]{64})(?:-([0-9a-f]{64}))?\.h5")  # number, digest, code, which was not told once
 Put = Callable[[Packed, Callable[[str], Path]], Published]
 """Write a record durably to the path found from the digest of its bytes."""
 

@@ -13,6 +13,7 @@ from koopcli.parsing import parse_json
 from koopcli.progress import Progress, silent
 from koopcli.store.files import UntrustedFileError, read_small, reading_errors
 from koopcli.store.names import STAGE, is_name
+from koopcli.store.parts import CHUNK
 from koopcli.store.records import BadRecordError, Record
 
 DIGEST = "[0-9a-f]{64}"
@@ -20,7 +21,6 @@ WRITER = r"\d+-[0-9a-f]{16}@.+"  # the process that writes or removes a file
 RECORD = re.compile(rf"({DIGEST})\.json")
 OBJECT = re.compile(rf"({DIGEST})\.h5")
 REMOVING = re.compile(rf"({DIGEST})\.h5\.{WRITER}")
-CHUNK = re.compile(rf"\d+-{DIGEST}\.h5")
 FOLDERS = ("objects", "records", "partial", "refs", "locks", "tmp", "quarantine", "reports")
 BESIDE = ("README.md", ".gitignore")  # what a checkout keeps in its store
 
