@@ -97,5 +97,5 @@ $(VENV)/.installed: pyproject.toml | $(VENV)/.created
 
 $(VENV)/.developing: pyproject.toml | $(VENV)/.created
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(RESOLUTION),uv,-e '.[dev]')
-	$(if $(RESOLUTION),$(BIN)/uv pip install --quiet --upgrade --python $(BIN) --resolution $(RESOLUTION) -e '.[dev]')
+	$(if $(RESOLUTION),$(BIN)/uv pip install --quiet --upgrade --python $(BIN)/python --resolution $(RESOLUTION) -e '.[dev]')
 	@touch $@ $(VENV)/.installed

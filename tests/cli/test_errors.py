@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import pwd
 import subprocess
 import sys
 
@@ -304,6 +305,16 @@ def test_a_picture_whose_name_is_as_long_as_a_name_can_be(koop, folder):
     name = "x" * 251 + ".png"
     assert koop("plot", "tyre", "-o", name).code == 0
     assert (folder / name).exists()
+
+
+def test_without_a_home_matplotlib_is_not_left_to_look_for_one(koop, monkeypatch):
+    """Below 3.11 it fails with a traceback, as in a container whose user has no name."""
+    for name in ("HOME", "MPLCONFIGDIR"):
+        monkeypatch.setenv(name, "")  # put back afterwards, whatever happens to it
+        monkeypatch.delenv(name)
+    monkeypatch.setattr(pwd, "getpwuid", lambda user: {}[user])
+    assert koop("plot", "--list").code == 0
+    assert os.environ["MPLCONFIGDIR"] == os.devnull
 
 
 def test_windows_gets_one_sentence(folder):
