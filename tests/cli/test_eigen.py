@@ -96,7 +96,8 @@ def test_initial_states_of_several_energies_are_said(koop):
 
 
 def test_another_vehicle_than_the_predictors_is_said(koop):
-    test = koop("simulate", koop("sample", "ball").name, "--vehicle", "rimac-2018", "--steps", "5").name
+    few = koop("sample", "ball", "--count", "40").name
+    test = koop("simulate", few, "--vehicle", "rimac-2018", "--steps", "5").name
     done = koop("evaluate", koop("fit-eigen").name, "--on", test)
     assert "are of another vehicle or plant than the predictor: lateral, longitudinal" in done.err
 

@@ -178,12 +178,14 @@ def test_at_standstill_no_state_moves(plant):
         assert not run(plant, np.zeros(5), u, 0.5).any()
 
 
-@pytest.mark.parametrize("speed", [1.0, 5.0, 30.0])
-def test_halving_the_substeps_moves_the_body_by_less_than_a_thousandth(plant, speed):
-    x0 = rolling(plant, speed) + np.array([0, 0.05 * speed, 0.1, 5.0, -3.0])
-    for u in ([0, 0, 0, 0, 0, 0.0], [0.05, 200, 0, 0.01, 0, 300.0], [-0.1, 0, 600, 0, 0, 600.0]):
-        chosen, halved = run(plant, x0, u, 0.3), run(plant, x0, u, 0.3, finer=2)
-        assert np.abs(chosen - halved)[0, -1, :3].max() <= 1e-3
+def test_halving_the_substeps_moves_the_body_by_less_than_a_thousandth(plant):
+    """Every speed under every input."""
+    speeds = np.array([1.0, 5.0, 30.0])
+    x0 = rolling(plant, *speeds) + speeds[:, np.newaxis] * [0, 0.05, 0, 0, 0] + [0, 0, 0.1, 5.0, -3.0]
+    u = np.array([[0, 0, 0, 0, 0, 0.0], [0.05, 200, 0, 0.01, 0, 300.0], [-0.1, 0, 600, 0, 0, 600.0]])
+    x0, u = np.repeat(x0, 3, axis=0), np.tile(u, (3, 1))
+    chosen, halved = run(plant, x0, u, 0.3), run(plant, x0, u, 0.3, finer=2)
+    assert np.abs(chosen - halved)[:, -1, :3].max() <= 1e-3
 
 
 def test_one_step_a_sample_chatters(plant):
@@ -205,18 +207,17 @@ def test_the_rate_is_the_stiffness_of_the_plant(plant):
         assert max(wheel_poles(plant.parameters, speed, plant.v_eps)) == pytest.approx(rate, rel=1e-9)
 
 
-def test_a_steady_turn_is_that_of_the_linear_car(plant, odd):
+@pytest.mark.parametrize("name", [*VEHICLES, "odd"])
+def test_a_steady_turn_is_that_of_the_linear_car(name, odd):
     """Yaw rate per steer v / (L + K v²) within 1 % at small steer; ``odd`` has K ≠ 0."""
-    for one in (plant, replace(odd, parameters=replace(odd.parameters, c_w=0.0))):
-        gliding = replace(one, parameters=replace(one.parameters, c_w=0.0))
-        for v in (8.0, 20.0):
-            steer = steady_steer(gliding.parameters, v, 0.2)
-            end = run(gliding, rolling(gliding, v), [steer, 0, 0, 0, 0, 0], 4.0)[0, -1]
-            assert end[2] == pytest.approx(0.2 / end[0], rel=0.01)
+    one = odd if name == "odd" else TorqueInput(vehicle_named(name))
+    gliding = replace(one, parameters=replace(one.parameters, c_w=0.0))
+    u = [[steady_steer(gliding.parameters, v, 0.2), 0, 0, 0, 0, 0] for v in (8.0, 20.0)]
+    end = run(gliding, rolling(gliding, 8.0, 20.0), u, 4.0)[:, -1]
+    assert end[:, 2] == pytest.approx(0.2 / end[:, 0], rel=0.01)
 
 
-@pytest.mark.parametrize(
-    ("x0", "u"),
+ROUGH = np.array(
     [
         ([20, 0, 0, 0, 0], [0, 0, 3000, 0, 0, 3000]),  # locked wheels that are braked
         ([20, 0, 0, 0, 0], [0, 1000, 3000, 0, 1000, 3000]),  # and driven
@@ -226,14 +227,17 @@ def test_a_steady_turn_is_that_of_the_linear_car(plant, odd):
         ([0, 0, 10, 0, 0], [0, 0, 0, 0, 0, 0]),
         ([0, 0, 0, 200, -200], [0, 0, 0, 0, 0, 0]),  # wheels against one another
     ],
+    dtype=[("x0", float, 5), ("u", float, 6)],
 )
-def test_rough_treatment_stays_finite(x0, u):
+
+
+def test_rough_treatment_stays_finite():
     plant = TorqueInput(vehicle_named("rimac-2018"))
-    x = run(plant, np.array(x0, float), np.array(u, float), 1.0)
+    x = run(plant, ROUGH["x0"], ROUGH["u"], 1.0)
     assert np.isfinite(x).all()
     assert np.abs(x[..., :2]).max() < 100
-    finer = run(plant, np.array(x0, float), np.array(u, float), 0.3, finer=2)
-    assert np.abs(x[0, 30, :3] - finer[0, -1, :3]).max() < 5e-3
+    finer = run(plant, ROUGH["x0"], ROUGH["u"], 0.3, finer=2)
+    assert np.abs(x[:, 30, :3] - finer[:, -1, :3]).max() < 5e-3
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
