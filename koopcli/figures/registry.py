@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from koopcli.config.pictures import Plot
 from koopcli.figures.drawing import Drawing, sources_of
+from koopcli.figures.signature import signature
 
 Takes = Literal["evaluation", "predictor", "fit", "sample", "trajectories", "sweep", "nothing"]
 
@@ -155,4 +156,5 @@ def drawing(settings: Plot, inputs: Mapping[str, Any]) -> Drawing:
 
     module = import_module(f"koopcli.figures.{settings.figure.replace('-', '_')}")
     shown = module.select(sources_of(settings, inputs), settings)
-    return Drawing(settings.figure, settings.format, module.numbers(shown), render(module.draw(shown), settings.format))
+    image = render(module.draw(shown), settings.format, signature(settings.of))
+    return Drawing(settings.figure, settings.format, module.numbers(shown), image)

@@ -5,18 +5,21 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from textwrap import fill
+from textwrap import fill, wrap
 from typing import Any
 
 from matplotlib import style as matplotlib_style
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.transforms import Bbox
 from mpl_toolkits.mplot3d import Axes3D
 
-from koopcli.figures.colours import COLOURS, DASHES
+from koopcli.figures.colours import COLOURS, DASHES, GUIDE
+from koopcli.figures.signature import LONGEST
 
 COLUMN = 3.5  # inches, one column of a two-column page
+SMALLEST = 7  # points: what can be read in print
 
 WIDEST, HANDLE, LINE = 62, 10, 0.13  # letters of a legend in one column, of a line before its name; inches of a row
 NARROW = 2000  # ratio of the ends of a logarithmic axis below which 2 and 5 are written too
@@ -112,9 +115,19 @@ UNDATED: dict[str, dict[str, None]] = {
 }
 
 
-def render(figure: Figure, image: str) -> bytes:
-    """The figure as a png, svg or pdf file; the same figure gives the same bytes."""
+def render(figure: Figure, image: str, line: str) -> bytes:
+    """The figure as a png, svg or pdf file with a grey ``line`` in a strip of its own below everything drawn; the same
+    figure gives the same bytes.
+    """
     target = io.BytesIO()
+    lines = wrap(line, LONGEST)
+    width, height = figure.get_size_inches()
+    below = LINE * len(lines)
     with style():
-        figure.savefig(target, format=image, metadata=UNDATED[image])
+        for i, text in enumerate(lines):
+            figure.text(
+                0.99, -LINE * (i + 0.2) / height, text, ha="right", va="top", fontsize=SMALLEST, color=GUIDE
+            ).set_in_layout(False)
+        whole = Bbox([[0, -below], [width, height]])
+        figure.savefig(target, format=image, metadata=UNDATED[image], bbox_inches=whole)
     return target.getvalue()

@@ -18,6 +18,7 @@ from koopcli.stages import grid, recipes
 from koopcli.stages.base import Task
 from koopcli.stages.makers import LIFTED, MAKERS
 from koopcli.stages.naming import names, points
+from koopcli.stages.subject import of_tyres, subject
 from koopcli.vehicles.plants import PLANTS
 
 TAKES: dict[str, tuple[str, ...]] = {
@@ -140,7 +141,8 @@ def figure(
         for role in kind.roles
     )
     told = {field: TOLD[field](experiment) for field in kind.told}
-    about = {"figure": name, "format": image, "drawn_by": source_digest()}
+    of = of_tyres(experiment) if "tyres" in kind.told else subject(artefacts, simulated)
+    about = {"figure": name, "format": image, "drawn_by": source_digest(), "of": of}
     return Task("plot", build(Plot, {**about, "series": _series(kind, artefacts, experiment, labels), **told}), inputs)
 
 
