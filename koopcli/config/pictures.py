@@ -54,6 +54,14 @@ class Tyres:
 
 
 @dataclass(frozen=True)
+class Cone:
+    """Where a cone of a course stands, ahead and to the left of the start, in m."""
+
+    X: float
+    Y: float
+
+
+@dataclass(frozen=True)
 class Subject:
     """What a figure is of: ``vehicles`` by what is known of them, since their names are in no key; what ``predictors``
     are called, one for each.
@@ -81,5 +89,6 @@ class Plot:
     of: Subject = Subject()
     series: tuple[Series, ...] = setting((), empty=True)
     tyres: tuple[Tyres, ...] = setting((), empty=True)
+    cones: tuple[Cone, ...] = setting((), empty=True)
     restart: int | None = None
     trajectory: int | None = None

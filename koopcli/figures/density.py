@@ -44,7 +44,7 @@ def select(sources: Sequence[Source], settings: Plot) -> Density:
 
 
 def _edges(distance: FloatArray) -> FloatArray:
-    """Ends (groups + 1,) of even bins, those of few trajectories joined to the next; a last such one to the one before."""
+    """Ends (groups + 1,) of even bins; one of few trajectories is joined to the next, the last to the one before."""
     even = np.linspace(distance.min(), distance.max(), BINS + 1)
     kept, held = [even[0]], np.searchsorted(np.sort(distance), even)
     last, count = 0, len(distance)

@@ -1,4 +1,4 @@
-"""Names at the ends of lines, where others have a legend: apart from one another, each as near to its end as that lets it."""
+"""Names at the ends of lines, where others have a legend: apart from one another, each as near to its end as can be."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from koopcli.figures.style import LINE, SMALLEST
 from koopcli.records import FloatArray
 
 WIDEST = 17  # letters of a name in a line
-LEADER = {"arrowstyle": "-", "patchA": None, "shrinkA": 3, "shrinkB": 0, "relpos": (0, 0.5)}
-AWAY = 0.12  # of the width of the panel: from the end of a line to its name
+AWAY, GAP = 0.11, 0.015  # of the width of the panel: what leads from the end of a line to its name, and before that
 
 
 @dataclass(frozen=True)
@@ -42,21 +42,16 @@ def name_ends(axes: Axes, ends: Sequence[End], height: float) -> None:
     heights = np.array([room_for([end.name]) for end in ends]) / height
     to_axes = axes.transData + axes.transAxes.inverted()
     wanted = np.array([to_axes.transform((axes.get_xlim()[1], end.at))[1] for end in ends])
-    for end, text, at, y in zip(ends, texts, wanted, apart(wanted, heights), strict=True):
-        axes.annotate(
-            text,
-            (1.0, float(np.clip(at, 0, 1))),
-            (1 + AWAY, y),
-            xycoords="axes fraction",
-            textcoords="axes fraction",
-            va="center",
-            color=end.colour,
-            fontsize=SMALLEST,
-            fontweight=end.weight,
-            linespacing=1.05,
-            annotation_clip=False,
-            arrowprops={**LEADER, **end.look},
-        )
+    for end, text, at, y in zip(ends, texts, np.clip(wanted, 0, 1), apart(wanted, heights), strict=True):
+        leader = Line2D([1, 1 + AWAY], [at, y], transform=axes.transAxes, clip_on=False, **end.look)
+        axes.add_artist(leader)
+        look: dict[str, Any] = {
+            "color": end.colour,
+            "fontsize": SMALLEST,
+            "fontweight": end.weight,
+            "linespacing": 1.05,
+        }
+        axes.text(1 + AWAY + GAP, y, text, transform=axes.transAxes, va="center", **look)
 
 
 def apart(wanted: FloatArray, heights: FloatArray) -> FloatArray:

@@ -51,9 +51,9 @@ def select(sources: Sequence[Source], settings: Plot) -> ErrorMap:
         ends = np.array([low[THROUGH], high[THROUGH]])
     bins = int(np.clip(np.sqrt(inside.sum() / EACH), 1, MOST))
     across, up = (np.linspace(middle[i] - half[i], middle[i] + half[i], bins + 1) for i in (ACROSS, UP))
-    at = seen.x0[inside][:, [UP, ACROSS]]
-    states = np.histogram2d(*at.T, bins=(up, across))[0]
-    total = np.histogram2d(*at.T, bins=(up, across), weights=seen.rmse[inside])[0]
+    y, x = seen.x0[inside, UP], seen.x0[inside, ACROSS]
+    states = np.histogram2d(y, x, bins=[up, across])[0]
+    total = np.histogram2d(y, x, bins=[up, across], weights=seen.rmse[inside])[0]
     enough = states >= min(FEWEST, states.max())
     mean = np.divide(total, states, out=np.full(states.shape, np.nan), where=enough)
     return ErrorMap(seen, ends, (across, up), mean, states)
@@ -85,7 +85,8 @@ def draw(shown: ErrorMap) -> Figure:
     """The slice large; beside it all states in space, the paler the smaller the error, in the same colours."""
     seen = shown.balls
     names = [axis_label(n, u) for n, u in zip(seen.channels.names, seen.channels.units, strict=True)]
-    shades = ScalarMappable(Normalize(0, seen.top), SHADES)
+    scale = Normalize(0, seen.top)
+    shades = ScalarMappable(scale, SHADES)
     through = shades.to_rgba(seen.rmse)
     through[:, 3] = PALEST + (1 - PALEST) * np.clip(seen.rmse / seen.top, 0, 1)
     with style():
@@ -93,7 +94,7 @@ def draw(shown: ErrorMap) -> Figure:
         grid = figure.add_gridspec(2, 2, width_ratios=[1.75, 1], height_ratios=[1, 0.045])
         cut = figure.add_subplot(grid[:, 0])
         cut.grid(visible=False)
-        cut.pcolormesh(*shown.edges, shown.mean, cmap=shades.cmap, norm=shades.norm, edgecolors="face", linewidth=0.1)
+        cut.pcolormesh(*shown.edges, shown.mean, cmap=SHADES, norm=scale, edgecolors="face", linewidth=0.1)
         cut.set_xlabel(names[ACROSS])
         cut.set_ylabel(names[UP])
         cut.set_title(f"mean where {_within(shown)}", fontsize=8)
@@ -101,7 +102,7 @@ def draw(shown: ErrorMap) -> Figure:
         space.scatter(
             *seen.x0[:, :3].T, s=seen.sizes / 3, color=through, depthshade=False, linewidths=0, rasterized=True
         )
-        in_space(space, [symbol(name) for name in seen.channels.names], zoom=1.2)
+        in_space(space, [symbol(name) for name in seen.channels.names], zoom=1.1)
         space.set_title("every state", fontsize=8)
         for axis in (space.xaxis, space.yaxis, space.zaxis):
             axis.set_major_locator(MaxNLocator(2))

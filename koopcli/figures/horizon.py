@@ -83,7 +83,7 @@ def draw(shown: Sequence[ErrorOverTime]) -> Figure:
         axes = figure.subplots()
         time = shown[0].time
         if alone:
-            axes.fill_between(time, *(_seen(q) for q in (shown[0].lower, shown[0].upper)), color=BAND, linewidth=0)
+            axes.fill_between(time, _seen(shown[0].lower), _seen(shown[0].upper), color=BAND, linewidth=0)
         for line in lines:
             dot = "o" if np.isfinite(line.values).sum() == 1 else ""  # a line of one point is none
             axes.plot(time, line.values, marker=dot, label=line.end.name, **line.look)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from koopcli import __version__
 from koopcli.config.pictures import Subject
 from koopcli.config.shipped import called
 
@@ -12,11 +11,12 @@ BETWEEN = " · "
 LONGEST = 60  # letters that a line has room for in one column
 
 
-def signature(of: Subject) -> str:
-    """The line of a figure; what there is several of is counted, and named where there is room for it.
+def signature(of: Subject, version: str) -> str:
+    """The line of a figure that this ``version`` draws; of what there is several is counted, and named where there is
+    room for it.
 
-    Names of vehicles are looked up and the version is this koop's: neither is in the key of a stored figure, which
-    keeps the line that it was drawn with.
+    Names of vehicles are looked up when it is drawn. Neither they nor the version are in the key of a stored figure,
+    which keeps the line that it was drawn with.
     """
     vehicles = [called(one) for one in of.vehicles]
     long, short = (
@@ -25,7 +25,7 @@ def signature(of: Subject) -> str:
             for part in (
                 _counted("vehicles", vehicles, vehicles if named else ()),
                 _counted("predictors", of.predictors, _families(of.predictors) if named else ()),
-                f"koop {__version__}",
+                f"koop {version}".strip(),
             )
             if part
         )

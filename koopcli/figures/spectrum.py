@@ -51,11 +51,12 @@ def select(sources: Sequence[Source], settings: Plot) -> Spectrum:
             rates = np.log(np.abs(eigenvalues)) / predictor.dt + 1j * (np.angle(eigenvalues) / predictor.dt)
         copies = 1
     damping = -rates.real[np.isfinite(rates)]
-    largest = float(np.abs(damping).max(initial=0.0)) or 1.0
-    linear = 10.0 ** (np.ceil(np.log10(largest)) - DECADES)
-    ends = _stretched(np.array([damping.min(initial=0.0), damping.max(initial=largest)]), linear)
-    edges = _back(np.linspace(*ends, BINS + 1), linear)
-    edges[[0, -1]] = edges[[0, -1]] * (1 + 1e-9 * np.sign(edges[[0, -1]]) * [-1, 1])
+    sizes = np.abs(damping[damping != 0]) if damping.any() else np.ones(1)
+    largest = float(sizes.max())
+    linear = 10.0 ** max(np.ceil(np.log10(largest)) - DECADES, np.floor(np.log10(sizes.min())))
+    low, high = _stretched(np.array([damping.min(initial=0.0), damping.max(initial=linear)]), linear)
+    edges = _back(np.linspace(low, high, BINS + 1), linear)
+    edges[[0, -1]] *= 1 + 1e-9  # away from zero by more than rounding
     counts = copies * np.histogram(damping, edges)[0].astype(float)
     return Spectrum(eigenvalues, rates, copies, linear, edges, counts)
 

@@ -19,6 +19,7 @@ from koopcli.figures.colours import COLOURS, DASHES, GUIDE
 from koopcli.figures.signature import LONGEST
 
 COLUMN = 3.5  # inches, one column of a two-column page
+DOTS = 300  # per inch, of a png
 SMALLEST = 7  # points: what can be read in print
 GAP = 0.04  # inches: above the line that says what a figure is of
 
@@ -41,7 +42,7 @@ STYLE = {
     "lines.linewidth": 1.2,
     "lines.markersize": 3.5,
     "legend.frameon": False,
-    "savefig.dpi": 300,
+    "savefig.dpi": DOTS,
     "svg.hashsalt": "koop",
     "svg.fonttype": "none",
 }
@@ -140,7 +141,7 @@ def render(figure: Figure, image: str, line: str) -> bytes:
 
 def _fix(figure: Figure) -> None:
     """Lay the figure out for print, for good: what is saved of it is then more than itself."""
-    figure.set_dpi(STYLE["savefig.dpi"])
+    figure.set_dpi(DOTS)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for legend in figure.legends:
