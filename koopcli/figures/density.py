@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -85,7 +86,8 @@ def draw(shown: Density) -> Figure:
         out = shown.outside
         if out.any():
             label = f"outside the hull ({out.sum()})"
-            axes.plot(shown.distance[out], shown.rmse[out], "^", color=COLOURS[1], markersize=3, mew=0, label=label)
+            look: dict[str, Any] = {"color": COLOURS[1], "markersize": 4, "markeredgecolor": "white", "mew": 0.4}
+            axes.plot(shown.distance[out], shown.rmse[out], "^", label=label, **look)
         axes.set_yscale("log")
         plain_numbers(axes.yaxis)
         axes.set_xlim(left=0)

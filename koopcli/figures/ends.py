@@ -45,13 +45,8 @@ def name_ends(axes: Axes, ends: Sequence[End], height: float) -> None:
     for end, text, at, y in zip(ends, texts, np.clip(wanted, 0, 1), apart(wanted, heights), strict=True):
         leader = Line2D([1, 1 + AWAY], [at, y], transform=axes.transAxes, clip_on=False, **end.look)
         axes.add_artist(leader)
-        look: dict[str, Any] = {
-            "color": end.colour,
-            "fontsize": SMALLEST,
-            "fontweight": end.weight,
-            "linespacing": 1.05,
-        }
-        axes.text(1 + AWAY + GAP, y, text, transform=axes.transAxes, va="center", **look)
+        look: dict[str, Any] = {"color": end.colour, "fontsize": SMALLEST, "fontweight": end.weight}
+        axes.text(1 + AWAY + GAP, y, text, transform=axes.transAxes, va="center", linespacing=1.05, **look)
 
 
 def apart(wanted: FloatArray, heights: FloatArray) -> FloatArray:

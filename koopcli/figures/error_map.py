@@ -102,12 +102,12 @@ def draw(shown: ErrorMap) -> Figure:
         space.scatter(
             *seen.x0[:, :3].T, s=seen.sizes / 3, color=through, depthshade=False, linewidths=0, rasterized=True
         )
-        in_space(space, [symbol(name) for name in seen.channels.names], zoom=1.1)
+        in_space(space, [symbol(name) for name in seen.channels.names], zoom=1.08)
         space.set_title("every state", fontsize=8)
         for axis in (space.xaxis, space.yaxis, space.zaxis):
             axis.set_major_locator(MaxNLocator(2))
             axis.set_ticklabels([])
-            axis.labelpad = -15
+            axis.labelpad = -17
             axis.set_rotate_label(axis is space.zaxis)
         bar = figure.add_subplot(grid[1, 1])
         figure.colorbar(shades, cax=bar, orientation="horizontal", label="RMSE (%)", extend=seen.beyond)

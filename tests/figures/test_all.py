@@ -119,7 +119,7 @@ def test_a_line_says_what_it_is_of_below_all_that_is_drawn(name):
     heights = [picture.get("height") for picture in (said, silent)]
     assert heights[0] == heights[1]
     line = next(one for one in said.iter() if (one.text or "").endswith("koop 9.8.7"))
-    place = float(re.search(r"translate\([\d.]+ ([\d.]+)\)|, ?([\d.]+)\)", line.get("transform"))[1])
+    place = float(line.get("y"))
     figure, _ = drawn(name)
     assert place > 72 * figure.get_figheight()
     assert place < float(said.get("viewBox").split()[3])
