@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from koopcli.checks import setting
+from koopcli.config.shipped import Fingerprint
 from koopcli.vehicles.parameters import MagicFormula
 
 FigureName = Literal[
@@ -53,6 +54,24 @@ class Tyres:
 
 
 @dataclass(frozen=True)
+class Cone:
+    """Where a cone of a course stands, ahead and to the left of the start, in m."""
+
+    X: float
+    Y: float
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What a figure is of: ``vehicles`` by what is known of them, since their names are in no key; what ``predictors``
+    are called, one for each.
+    """
+
+    vehicles: tuple[Fingerprint, ...] = setting((), empty=True)
+    predictors: tuple[str, ...] = setting((), empty=True)
+
+
+@dataclass(frozen=True)
 class PlotOptions:
     """What figures can be told."""
 
@@ -62,12 +81,14 @@ class PlotOptions:
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure, what it is told beside its inputs, and the digest of the code that draws it."""
+    """A figure, what it is of and told beside its inputs, and the digest of the code that draws it."""
 
     figure: FigureName
     format: ImageFormat
     drawn_by: str
+    of: Subject = Subject()
     series: tuple[Series, ...] = setting((), empty=True)
     tyres: tuple[Tyres, ...] = setting((), empty=True)
+    cones: tuple[Cone, ...] = setting((), empty=True)
     restart: int | None = None
     trajectory: int | None = None

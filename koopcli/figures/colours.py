@@ -9,4 +9,6 @@ DASHES = ("-", "--", ":")
 PAPER = "#000000"
 TRAINING = "#bbbbbb"
 GUIDE = "#888888"  # what is not data: axes through zero, the unit circle, restarts
+OTHERS = ("#555555", "#999999")  # lines that another one is set beside
+BAND = "#b9d7ea"  # what most of the data lie in
 SHADES = "viridis_r"  # even in lightness, dark where errors are large

@@ -4,29 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import COLOURS, PAPER
+from koopcli.figures.colours import BAND, COLOURS
 from koopcli.figures.drawing import Source, column, with_error
 from koopcli.figures.style import COLUMN, legend_below, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray
 
-GROUPS = 20  # of equally many trajectories, by distance
+BINS, FEWEST = 20, 20  # of distance, even; trajectories that a group of them has at least
+QUANTILES = (0.1, 0.25, 0.5, 0.75, 0.9)
 
 
 @dataclass(frozen=True)
 class Density:
     """``rmse`` (n,) in percent against ``distance`` (n,) of x0 to the training states in half-widths of their box, and
-    whether it lies ``outside`` (n,) their hull; medians ``typical`` (groups, 2) of distance and RMSE by distance.
+    whether it lies ``outside`` (n,) their hull; the ``quantiles`` (5, groups) of the RMSE between ``edges``
+    (groups + 1,) of distance, the first and the last of all.
     """
 
     distance: FloatArray
     rmse: FloatArray
     outside: BoolArray
-    typical: FloatArray
+    edges: FloatArray
+    quantiles: FloatArray
 
 
 def select(sources: Sequence[Source], settings: Plot) -> Density:
@@ -34,46 +38,60 @@ def select(sources: Sequence[Source], settings: Plot) -> Density:
     evaluation = sources[0].records["evaluation"]
     (shown,) = with_error(sources)
     distance, rmse = evaluation.distance[shown], evaluation.rmse[shown]
-    groups = np.array_split(np.argsort(distance, kind="stable"), min(GROUPS, len(rmse)))
-    typical = np.array([[np.median(distance[group]), np.median(rmse[group])] for group in groups])
-    return Density(distance, rmse, np.asarray(evaluation.outside[shown], dtype=bool), typical)
+    edges = _edges(distance)
+    group = np.clip(np.searchsorted(edges, distance, side="right") - 1, 0, len(edges) - 2)
+    quantiles = np.array([np.quantile(rmse[group == i], QUANTILES) for i in range(len(edges) - 1)]).T
+    return Density(distance, rmse, np.asarray(evaluation.outside[shown], dtype=bool), edges, quantiles)
+
+
+def _edges(distance: FloatArray) -> FloatArray:
+    """Ends (groups + 1,) of even bins; one of few trajectories is joined to the next, the last to the one before."""
+    even = np.linspace(distance.min(), distance.max(), BINS + 1)
+    kept, held = [even[0]], np.searchsorted(np.sort(distance), even)
+    last, count = 0, len(distance)
+    for edge, below in zip(even[1:-1], held[1:-1], strict=True):
+        if below - last >= FEWEST and count - below >= FEWEST:
+            kept.append(edge)
+            last = below
+    return np.array([*kept, even[-1]])
 
 
 def numbers(shown: Density) -> Mapping[str, Array]:
-    """Every trajectory, and the medians of the groups."""
+    """Every trajectory, and the quantiles of the groups."""
     return {
         "distance": column(shown.distance, "trajectory", "half-widths"),
         "rmse": column(shown.rmse, "trajectory", "%"),
         "outside": column(shown.outside, "trajectory", "1"),
-        "group/distance": column(shown.typical[:, 0], "group", "half-widths"),
-        "group/rmse": column(shown.typical[:, 1], "group", "%"),
+        "group/distance from": column(shown.edges[:-1], "group", "half-widths"),
+        "group/distance to": column(shown.edges[1:], "group", "half-widths"),
+        **{
+            f"group/rmse {100 * q:g} %": column(values, "group", "%")
+            for q, values in zip(QUANTILES, shown.quantiles, strict=True)
+        },
     }
 
 
 def draw(shown: Density) -> Figure:
-    """A dot for each trajectory, the medians as a line over them."""
+    """Bands of quantiles from the nearest state to the farthest, and a mark for each state outside the hull."""
+    lowest, lower, median, upper, highest = shown.quantiles
     with style():
-        figure = Figure(figsize=(COLUMN, 2.7), layout="constrained")
+        figure = Figure(figsize=(COLUMN, 2.5), layout="constrained")
         axes = figure.subplots()
-        for which, colour, marker, size, label in (
-            (~shown.outside, COLOURS[5], "o", 2, "$x_0$ inside the hull of the data"),
-            (shown.outside, COLOURS[1], "^", 3, "$x_0$ outside"),
+        for low, high, colour, label in (
+            (lowest, highest, BAND, "10 to 90 % of the states"),
+            (lower, upper, COLOURS[5], "25 to 75 %"),
         ):
-            if which.any():
-                axes.plot(
-                    shown.distance[which],
-                    shown.rmse[which],
-                    marker,
-                    color=colour,
-                    markersize=size,
-                    markeredgewidth=0,
-                    label=f"{label} ({which.sum()})",
-                    rasterized=True,
-                )
-        axes.plot(*shown.typical.T, "-", color=PAPER, label="median by distance")
+            axes.stairs(high, shown.edges, baseline=low, fill=True, color=colour, linewidth=0, label=label)
+        axes.stairs(median, shown.edges, baseline=None, color=COLOURS[0], linewidth=1.6, label="median")
+        out = shown.outside
+        if out.any():
+            label = f"outside the hull ({out.sum()})"
+            look: dict[str, Any] = {"color": COLOURS[1], "markersize": 4, "markeredgecolor": "white", "mew": 0.4}
+            axes.plot(shown.distance[out], shown.rmse[out], "^", label=label, **look)
         axes.set_yscale("log")
         plain_numbers(axes.yaxis)
+        axes.set_xlim(left=0)
         axes.set_xlabel("distance of $x_0$ to the data (half-widths of its box)")
         axes.set_ylabel("RMSE (%)")
-        legend_below(figure, markerscale=2)
+        legend_below(figure)
     return figure

@@ -1,60 +1,123 @@
-"""Where the errors are: every initial state as a ball whose size and colour is the RMSE of its trajectory."""
+"""Where the errors are: mean RMSE over a slice of initial states, beside the paper's balls in space."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from koopcli.config.pictures import Plot
 from koopcli.figures.balls import Balls, balls, columns
 from koopcli.figures.colours import SHADES
-from koopcli.figures.drawing import Source
-from koopcli.figures.style import COLUMN, axis_label, in_space, style
-from koopcli.records import Array
+from koopcli.figures.drawing import Source, column
+from koopcli.figures.style import COLUMN, axis_label, in_space, style, symbol
+from koopcli.records import Array, FloatArray
 
 PALEST = 0.2  # opacity of a ball without error
+ACROSS, UP, THROUGH = 0, 2, 1  # the states of the slice, and the one that it is thin in
+THICKNESS = 1 / 3  # of the range of that state
+EACH = 7  # states of a bin, about
+MOST = 20  # bins along an axis
+FEWEST = 3  # states that have a mean worth drawing
 
 
-def select(sources: Sequence[Source], settings: Plot) -> Balls:
+@dataclass(frozen=True)
+class ErrorMap:
+    """All initial states as ``balls``; of those with the state ``THROUGH`` between ``ends`` (2,) the ``mean`` RMSE in
+    percent and how many ``states`` there are, (bins up, bins across) between ``edges``; a bin of few has no mean.
+    """
+
+    balls: Balls
+    ends: FloatArray
+    edges: tuple[FloatArray, FloatArray]
+    mean: FloatArray
+    states: FloatArray
+
+
+def select(sources: Sequence[Source], settings: Plot) -> ErrorMap:
     """What the figure shows. Raises ``InvalidValueError`` where every prediction diverged."""
-    return balls(sources[0])
+    seen = balls(sources[0])
+    low, high = seen.x0.min(axis=0), seen.x0.max(axis=0)
+    middle, half = (low + high) / 2, np.maximum((high - low) / 2, 1e-9)
+    ends = middle[THROUGH] + THICKNESS * half[THROUGH] * np.array([-1, 1])
+    inside = (seen.x0[:, THROUGH] >= ends[0]) & (seen.x0[:, THROUGH] <= ends[1])
+    if not inside.any():
+        inside = np.ones(len(inside), dtype=bool)
+        ends = np.array([low[THROUGH], high[THROUGH]])
+    bins = int(np.clip(np.sqrt(inside.sum() / EACH), 1, MOST))
+    across, up = (np.linspace(middle[i] - half[i], middle[i] + half[i], bins + 1) for i in (ACROSS, UP))
+    y, x = seen.x0[inside, UP], seen.x0[inside, ACROSS]
+    states = np.histogram2d(y, x, bins=[up, across])[0]
+    total = np.histogram2d(y, x, bins=[up, across], weights=seen.rmse[inside])[0]
+    enough = states >= min(FEWEST, states.max())
+    mean = np.divide(total, states, out=np.full(states.shape, np.nan), where=enough)
+    return ErrorMap(seen, ends, (across, up), mean, states)
 
 
-def numbers(shown: Balls) -> Mapping[str, Array]:
-    """Every initial state with its error."""
-    return columns(shown)
+def numbers(shown: ErrorMap) -> Mapping[str, Array]:
+    """Every initial state with its error; the slice, its bins that have a mean, and how many states they are of."""
+    rows, cells = np.nonzero(np.isfinite(shown.mean))
+    (across, up), channels = shown.edges, shown.balls.channels
+    through = channels.names[THROUGH], channels.units[THROUGH]
+    bins = {
+        f"bin/{channels.names[state]} {end}": column(edges[which + step], "bin", channels.units[state])
+        for state, edges, which in ((ACROSS, across, cells), (UP, up, rows))
+        for end, step in (("from", 0), ("to", 1))
+    }
+    return {
+        **columns(shown.balls),
+        **{f"slice/{through[0]} {end}": column(shown.ends[i : i + 1], "slice", through[1]) for i, end in FROM_TO},
+        **bins,
+        "bin/mean rmse": column(shown.mean[rows, cells], "bin", "%"),
+        "bin/states": column(shown.states[rows, cells], "bin", "1"),
+    }
 
 
-def draw(shown: Balls) -> Figure:
-    """The first three states in space, the paler the smaller the error; and from above, the largest errors on top."""
-    names = [axis_label(n, u) for n, u in zip(shown.channels.names, shown.channels.units, strict=True)]
-    shades = ScalarMappable(Normalize(0, shown.top), SHADES)
-    colours = shades.to_rgba(shown.rmse)
-    through = np.column_stack([colours[:, :3], PALEST + (1 - PALEST) * np.clip(shown.rmse / shown.top, 0, 1)])
+FROM_TO = ((0, "from"), (1, "to"))
+
+
+def draw(shown: ErrorMap) -> Figure:
+    """The slice large; beside it all states in space, the paler the smaller the error, in the same colours."""
+    seen = shown.balls
+    names = [axis_label(n, u) for n, u in zip(seen.channels.names, seen.channels.units, strict=True)]
+    scale = Normalize(0, seen.top)
+    shades = ScalarMappable(scale, SHADES)
+    through = shades.to_rgba(seen.rmse)
+    through[:, 3] = PALEST + (1 - PALEST) * np.clip(seen.rmse / seen.top, 0, 1)
     with style():
-        figure = Figure(figsize=(COLUMN, 6.2), layout="constrained")
-        space = figure.add_subplot(2, 1, 1, projection="3d")
-        space.scatter(*shown.x0[:, :3].T, s=shown.sizes, color=through, depthshade=False, linewidths=0, rasterized=True)
-        in_space(space, names, zoom=1.0)
-        above = figure.add_subplot(2, 1, 2)
-        above.scatter(
-            shown.x0[:, 0], shown.x0[:, 1], s=shown.sizes, color=colours, linewidths=0, zorder=3, rasterized=True
+        figure = Figure(figsize=(COLUMN, 2.45), layout="constrained")
+        grid = figure.add_gridspec(2, 2, width_ratios=[1.75, 1], height_ratios=[1, 0.045])
+        cut = figure.add_subplot(grid[:, 0])
+        cut.grid(visible=False)
+        cut.pcolormesh(*shown.edges, shown.mean, cmap=SHADES, norm=scale, edgecolors="face", linewidth=0.1)
+        cut.set_xlabel(names[ACROSS])
+        cut.set_ylabel(names[UP])
+        cut.set_title(f"mean where {_within(shown)}", fontsize=8)
+        space = figure.add_subplot(grid[0, 1], projection="3d")
+        space.scatter(
+            *seen.x0[:, :3].T, s=seen.sizes / 3, color=through, depthshade=False, linewidths=0, rasterized=True
         )
-        if len(set(shown.channels.units[:2])) == 1:
-            above.set_aspect("equal", adjustable="datalim")
-        above.set_xlabel(names[0])
-        above.set_ylabel(names[1])
-        bar: dict[str, Any] = {
-            "location": "bottom",
-            "label": "RMSE (%)",
-            "extend": shown.beyond,
-            "shrink": 0.8,
-            "aspect": 35,
-        }
-        figure.colorbar(shades, ax=above, **bar)
+        in_space(space, [symbol(name) for name in seen.channels.names], zoom=1.08)
+        space.set_title("every state", fontsize=8)
+        for axis in (space.xaxis, space.yaxis, space.zaxis):
+            axis.set_major_locator(MaxNLocator(2))
+            axis.set_ticklabels([])
+            axis.labelpad = -17
+            axis.set_rotate_label(axis is space.zaxis)
+        bar = figure.add_subplot(grid[1, 1])
+        figure.colorbar(shades, cax=bar, orientation="horizontal", label="RMSE (%)", extend=seen.beyond)
     return figure
+
+
+def _within(shown: ErrorMap) -> str:
+    """The slice in words."""
+    name, unit = shown.balls.channels.names[THROUGH], shown.balls.channels.units[THROUGH]
+    low, high = shown.ends
+    if abs(low + high) < 0.05 * (high - low):
+        return f"|{symbol(name)}| < {(high - low) / 2:.3g} {unit}"
+    return f"{low:.3g} < {symbol(name)} < {high:.3g} {unit}"

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import COLOURS
+from koopcli.figures.colours import BAND, COLOURS, DASHES, OTHERS
 from koopcli.figures.drawing import LOST, Source, column, with_error
-from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
+from koopcli.figures.ends import End, name_ends, room_for
+from koopcli.figures.style import COLUMN, plain, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray, Trajectories
 
 QUANTILES = {"lower": 0.1, "median": 0.5, "upper": 0.9}
 BLOCK = 4096  # trajectories predicted together
+THICK = 2.4  # points
+LOWEST, BELOW = 1.9, 0.55  # inches: the panel at least, and what is below it
 SHOWN_FROM = 1e-3  # %, of errors on a logarithmic axis; a start that is known is exact
 
 
@@ -68,31 +72,72 @@ def numbers(shown: Sequence[ErrorOverTime]) -> Mapping[str, Array]:
 
 
 def draw(shown: Sequence[ErrorOverTime]) -> Figure:
-    """Median and the band that holds eight of ten trajectories of one evaluation; medians of several."""
+    """Median and the band that holds eight of ten trajectories of one evaluation; the medians of several, the first
+    thick and the others grey. Each line is named at its end.
+    """
+    alone = len(shown) == 1
+    lines = _band(shown[0]) if alone else [_median(one, i) for i, one in enumerate(shown)]
+    height = max(LOWEST, room_for([line.end.name for line in lines]))
     with style():
-        figure = Figure(figsize=(COLUMN, 2.6), layout="constrained")
+        figure = Figure(figsize=(COLUMN, height + BELOW), layout="constrained")
         axes = figure.subplots()
-        for one, look in zip(shown, looks(len(shown)), strict=True):
-            if len(shown) == 1:
-                axes.fill_between(
-                    one.time,
-                    _seen(one.lower),
-                    _seen(one.upper),
-                    color=COLOURS[5],
-                    alpha=0.4,
-                    linewidth=0,
-                    label="10 to 90 % of trajectories",
-                )
-            median = _seen(one.median)
-            alone = np.isfinite(median).sum() == 1  # a line of one point is none
-            axes.plot(one.time, median, marker="o" if alone else "", label=plain(one.label) or "median", **look)
+        time = shown[0].time
+        if alone:
+            axes.fill_between(time, _seen(shown[0].lower), _seen(shown[0].upper), color=BAND, linewidth=0)
+        for line in lines:
+            dot = "o" if np.isfinite(line.values).sum() == 1 else ""  # a line of one point is none
+            axes.plot(time, line.values, marker=dot, label=line.end.name, **line.look)
         axes.set_yscale("log")
         plain_numbers(axes.yaxis)
         axes.set_xlabel("time (s)")
-        axes.set_ylabel("error (% of the trajectory's size)" if len(shown) == 1 else "median error (% of the size)")
-        axes.set_xlim(shown[0].time[0], shown[0].time[-1])
-        legend_below(figure)
+        axes.set_ylabel("error (% of the trajectory's size)" if alone else "median error (% of the size)")
+        axes.set_xlim(time[0], time[-1])
+        axes.set_ylim(*axes.get_ylim())
+        name_ends(axes, [line.end for line in lines], height)
     return figure
+
+
+@dataclass(frozen=True)
+class _Line:
+    """What is drawn at the times of the figure, how, and its end."""
+
+    values: FloatArray
+    look: dict[str, Any]
+    end: End
+
+
+def _median(one: ErrorOverTime, place: int) -> _Line:
+    """The median of one among several: the first is what the others are set beside."""
+    values = _seen(one.median)
+    if place == 0:
+        look, colour, weight = {"color": COLOURS[0], "linewidth": THICK, "zorder": 3}, COLOURS[0], "bold"
+    else:
+        colour, weight = OTHERS[0], "normal"
+        look = {"color": OTHERS[place % len(OTHERS)], "linewidth": 1.0, "linestyle": DASHES[place % len(DASHES)]}
+    return _Line(values, look, End(_last(values), plain(one.label), colour, _leading(look), weight))
+
+
+def _band(one: ErrorOverTime) -> list[_Line]:
+    """The median of the only evaluation, and the ends of its band."""
+    ends = [("upper", "90 % are below", 0.6, OTHERS[0]), ("median", "median", THICK, COLOURS[0])]
+    ends.append(("lower", "10 % are below", 0.6, OTHERS[0]))
+    found = []
+    for name, text, width, colour in ends:
+        values = _seen(getattr(one, name))
+        look = {"color": colour, "linewidth": width}
+        found.append(_Line(values, look, End(_last(values), text, colour, _leading(look))))
+    return found
+
+
+def _leading(look: Mapping[str, Any]) -> dict[str, Any]:
+    """The look of what leads from the end of a line to its name."""
+    return {**look, "linewidth": min(0.8, look["linewidth"]), "zorder": 1}
+
+
+def _last(values: FloatArray) -> float:
+    """The last error that is drawn; one that diverged altogether is beyond all."""
+    drawn = values[np.isfinite(values)]
+    return float(drawn[-1]) if len(drawn) else np.inf
 
 
 def _seen(values: FloatArray) -> FloatArray:

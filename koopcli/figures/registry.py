@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from koopcli.config.pictures import Plot
 from koopcli.figures.drawing import Drawing, sources_of
+from koopcli.figures.signature import signature
 
 Takes = Literal["evaluation", "predictor", "fit", "sample", "trajectories", "sweep", "nothing"]
 
@@ -49,11 +50,11 @@ FIGURES: dict[str, FigureKind] = {
         told=("tyres",),
     ),
     "trajectory": FigureKind(
-        "one simulated trajectory: path, states and inputs",
+        "one simulated trajectory: course, states and inputs",
         "trajectories",
         ("trajectories",),
         "manoeuvre",
-        told=("trajectory",),
+        told=("trajectory", "cones"),
     ),
     "orders": FigureKind(
         "RMSE against the order of the basis, beside the paper's best",
@@ -84,7 +85,9 @@ FIGURES: dict[str, FigureKind] = {
         "surface",
         kinds=("ellipsoid",),
     ),
-    "error-map": FigureKind("RMSE by initial state, in space and from above", "evaluation", ("evaluation",), "eigen"),
+    "error-map": FigureKind(
+        "RMSE by initial state: its mean over a slice, and every state in space", "evaluation", ("evaluation",), "eigen"
+    ),
     "error-side": FigureKind(
         "RMSE by initial state from the side, over the training trajectories",
         "evaluation",
@@ -144,15 +147,16 @@ FIGURES: dict[str, FigureKind] = {
         "errors and the bounds that the predictor gives for them", "evaluation", ("evaluation", "predictor"), "trusted"
     ),
     "spectrum": FigureKind(
-        "eigenvalues of a predictor beside the unit circle and the half plane", "fit", ("predictor",), "edmd-fit"
+        "damping of the modes of a predictor against their frequency", "fit", ("predictor",), "edmd-fit"
     ),
 }
 
 
-def drawing(settings: Plot, inputs: Mapping[str, Any]) -> Drawing:
-    """The figure that ``settings`` ask for, from records by ``number/role``."""
+def drawing(settings: Plot, inputs: Mapping[str, Any], version: str = "") -> Drawing:
+    """The figure that ``settings`` ask for, from records by ``number/role``, as this ``version`` of koop draws it."""
     from koopcli.figures.style import render  # noqa: PLC0415  (matplotlib only when something is drawn)
 
     module = import_module(f"koopcli.figures.{settings.figure.replace('-', '_')}")
     shown = module.select(sources_of(settings, inputs), settings)
-    return Drawing(settings.figure, settings.format, module.numbers(shown), render(module.draw(shown), settings.format))
+    image = render(module.draw(shown), settings.format, signature(settings.of, version))
+    return Drawing(settings.figure, settings.format, module.numbers(shown), image)

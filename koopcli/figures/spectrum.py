@@ -1,4 +1,4 @@
-"""Eigenvalues of a predictor: of the discrete A beside the unit circle, as continuous rates beside the half plane."""
+"""How fast the modes of a predictor decay, against how fast they swing: many on one place are counted."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter, SymmetricalLogLocator
 
 from koopcli.config.pictures import Plot
 from koopcli.figures.colours import COLOURS, GUIDE
@@ -15,86 +16,116 @@ from koopcli.figures.drawing import Source, column
 from koopcli.figures.style import COLUMN, legend_below, style
 from koopcli.koopman.modes import ComplexArray, Modes
 from koopcli.koopman.predictor import Predictor
-from koopcli.records import Array
+from koopcli.records import Array, FloatArray
 
-TALL = 1.4  # height of a panel over its width
 ROUNDING = 1e-9  # of an eigenvalue: one that is 1 neither grows nor decays
+DECADES = 4  # of damping that are drawn on a logarithmic axis; what is nearer to zero lies on a linear one
+SLOWEST = 1.0  # Hz, where the axis of frequencies ends at least
+BINS = 24  # of damping, counted beside the rings
 
 
 @dataclass(frozen=True)
 class Spectrum:
     """``eigenvalues`` (m,) of A and their ``rates`` (m,) in 1/s, each ``copies`` times; an eigenvalue of zero has the
-    rate minus infinity, which is not drawn.
+    rate minus infinity, which is not drawn. ``counts`` (bins,) of all copies with a damping between ``edges``
+    (bins + 1,) in 1/s, even on an axis that is linear up to ``linear``.
     """
 
     eigenvalues: ComplexArray
     rates: ComplexArray
     copies: int
+    linear: float
+    edges: FloatArray
+    counts: FloatArray
 
 
 def select(sources: Sequence[Source], settings: Plot) -> Spectrum:
     """What the figure shows."""
     predictor: Predictor = sources[0].records["predictor"]
     if isinstance(predictor.A, Modes):
-        return Spectrum(predictor.A.eigenvalues, predictor.A.rates, predictor.A.copies)
-    eigenvalues = np.linalg.eigvals(predictor.A).astype(complex)
-    eigenvalues = eigenvalues[np.lexsort([eigenvalues.imag, eigenvalues.real])]
-    with np.errstate(divide="ignore"):
-        rates = np.log(np.abs(eigenvalues)) / predictor.dt + 1j * (np.angle(eigenvalues) / predictor.dt)
-    return Spectrum(eigenvalues, rates, 1)
+        eigenvalues, rates, copies = predictor.A.eigenvalues, predictor.A.rates, predictor.A.copies
+    else:
+        eigenvalues = np.linalg.eigvals(predictor.A).astype(complex)
+        eigenvalues = eigenvalues[np.lexsort([eigenvalues.imag, eigenvalues.real])]
+        with np.errstate(divide="ignore"):
+            rates = np.log(np.abs(eigenvalues)) / predictor.dt + 1j * (np.angle(eigenvalues) / predictor.dt)
+        copies = 1
+    damping = -rates.real[np.isfinite(rates)]
+    sizes = np.abs(damping[damping != 0]) if damping.any() else np.ones(1)
+    largest = float(sizes.max())
+    linear = 10.0 ** max(np.ceil(np.log10(largest)) - DECADES, np.floor(np.log10(sizes.min())))
+    low, high = _stretched(np.array([damping.min(initial=0.0), damping.max(initial=linear)]), linear)
+    edges = _back(np.linspace(low, high, BINS + 1), linear)
+    edges[[0, -1]] *= 1 + 1e-9  # away from zero by more than rounding
+    counts = copies * np.histogram(damping, edges)[0].astype(float)
+    return Spectrum(eigenvalues, rates, copies, linear, edges, counts)
 
 
 def numbers(shown: Spectrum) -> Mapping[str, Array]:
-    """Real and imaginary parts."""
+    """Real and imaginary parts, and how many lie between which dampings."""
     return {
         "eigenvalue/real": column(shown.eigenvalues.real, "eigenvalue", "1"),
         "eigenvalue/imaginary": column(shown.eigenvalues.imag, "eigenvalue", "1"),
         "rate/real": column(shown.rates.real, "eigenvalue", "1/s"),
         "rate/imaginary": column(shown.rates.imag, "eigenvalue", "1/s"),
         "copies": column(np.full(len(shown.rates), float(shown.copies)), "eigenvalue", "1"),
+        "bin/damping from": column(shown.edges[:-1], "bin", "1/s"),
+        "bin/damping to": column(shown.edges[1:], "bin", "1/s"),
+        "bin/count": column(shown.counts, "bin", "1"),
     }
 
 
 def draw(shown: Spectrum) -> Figure:
-    """Both views; what grows lies outside the circle and to the right of the line."""
-    growing = np.abs(shown.eigenvalues) > 1 + ROUNDING
+    """A ring for each pair of rates and each real one, and how many share a damping; what grows is below zero."""
+    drawn = np.isfinite(shown.rates) & (shown.rates.imag >= 0)  # of a pair the half with the positive frequency
+    frequency, damping = shown.rates.imag[drawn] / (2 * np.pi), -shown.rates.real[drawn]
+    growing = np.abs(shown.eigenvalues[drawn]) > 1 + ROUNDING
+    all_growing = np.abs(shown.eigenvalues) > 1 + ROUNDING
     with style():
         figure = Figure(figsize=(COLUMN, 2.7), layout="constrained")
-        circle, plane = figure.subplots(1, 2)
-        angle = np.linspace(0, 2 * np.pi, 721)
-        circle.plot(np.cos(angle), np.sin(angle), color=GUIDE, linewidth=0.8, label="unit circle, half plane")
-        plane.axvline(0, color=GUIDE, linewidth=0.8)
-        for axes, values in ((circle, shown.eigenvalues), (plane, shown.rates)):
-            drawn = np.isfinite(values)
-            for which, colour, marker, label in (
-                (~growing & drawn, COLOURS[0], "o", "decay or stay"),
-                (growing & drawn, COLOURS[1], "^", "grow"),
-            ):
-                axes.plot(
-                    values.real[which],
-                    values.imag[which],
-                    marker,
-                    color=colour,
-                    label=f"{which.sum()} that {label}" if axes is circle and which.any() else None,
-                    fillstyle="none",
-                    markersize=3,
-                    markeredgewidth=0.6,
-                    zorder=3,
-                )
-        _frame(circle, shown.eigenvalues)
-        for axes, name, unit in ((circle, "eigenvalues of A", "1"), (plane, "their rates", "1/s")):
-            axes.set_title(name, fontsize=8)
-            axes.set_xlabel(f"real part ({unit})")
-            axes.set_ylabel(f"imaginary part ({unit})")
-            axes.set_box_aspect(TALL)
-        title = f"each {shown.copies} times" if shown.copies > 1 else None
-        legend_below(figure, title)
+        plane, density = figure.subplots(1, 2, sharey=True, width_ratios=[3, 1])
+        for which, everywhere, colour, marker, label in (
+            (~growing, ~all_growing, COLOURS[0], "o", "decay or stay"),
+            (growing, all_growing, COLOURS[1], "^", "grow"),
+        ):
+            if which.any():
+                name = f"{shown.copies * everywhere.sum()} that {label}"
+                look = {"fillstyle": "none", "markersize": 3, "markeredgewidth": 0.6, "zorder": 3, "clip_on": False}
+                plane.plot(frequency[which], damping[which], marker, color=colour, label=name, **look)
+        density.stairs(shown.counts, shown.edges, orientation="horizontal", fill=True, color=COLOURS[5])
+        for axes in (plane, density):
+            axes.axhline(0, color=GUIDE, linewidth=0.8)
+        fastest = max(SLOWEST, float(frequency.max(initial=0.0)))
+        plane.set_xlim(-0.03 * fastest, 1.03 * fastest)  # room for rings at zero
+        plane.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        density.set_xlim(left=0)
+        _damping_axis(plane, shown)
+        plane.set_xlabel("frequency (Hz)")
+        plane.set_ylabel("damping (1/s)")
+        density.set_xlabel("number (1)")
+        density.xaxis.set_major_locator(MaxNLocator(2, integer=True))
+        legend_below(figure, f"each {shown.copies} times" if shown.copies > 1 else None)
     return figure
 
 
-def _frame(axes: Axes, values: ComplexArray) -> None:
-    """Show all eigenvalues and as much of the circle as belongs to them, both axes to one scale."""
-    width = max(np.ptp(values.real), np.ptp(values.imag) / TALL, 0.02) * 1.15
-    x, y = (values.real.max() + values.real.min()) / 2, (values.imag.max() + values.imag.min()) / 2
-    axes.set_xlim(x - width / 2, x + width / 2)
-    axes.set_ylim(y - TALL * width / 2, y + TALL * width / 2)
+def _damping_axis(axes: Axes, shown: Spectrum) -> None:
+    """Damping, logarithmic to both sides of zero where it goes far."""
+    axes.set_yscale("symlog", linthresh=shown.linear)
+    low, high = _stretched(shown.edges[[0, -1]], shown.linear)
+    margin = 0.05 * (high - low)
+    axes.set_ylim(*_back(np.array([low - margin, high + margin]), shown.linear))
+    axes.yaxis.set_major_locator(SymmetricalLogLocator(base=10, linthresh=shown.linear))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _stretched(values: FloatArray, linear: float) -> FloatArray:
+    """Places on an axis that is linear up to ``linear`` and then has a unit for each factor of ten."""
+    size = np.abs(values) / linear
+    return np.sign(values) * np.where(size <= 1, size, 1 + np.log10(np.maximum(size, 1)))
+
+
+def _back(places: FloatArray, linear: float) -> FloatArray:
+    """The values at places of :func:`_stretched`."""
+    size = np.abs(places)
+    return np.sign(places) * linear * np.where(size <= 1, size, 10.0 ** (np.maximum(size, 1) - 1))

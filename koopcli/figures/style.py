@@ -5,19 +5,24 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from textwrap import fill
+from textwrap import fill, wrap
 from typing import Any
 
 from matplotlib import style as matplotlib_style
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.transforms import Bbox
 from mpl_toolkits.mplot3d import Axes3D
 
-from koopcli.figures.colours import COLOURS, DASHES
+from koopcli.figures.colours import COLOURS, DASHES, GUIDE
+from koopcli.figures.signature import LONGEST
 from koopcli.text import printable
 
 COLUMN = 3.5  # inches, one column of a two-column page
+DOTS = 300  # per inch, of a png
+SMALLEST = 7  # points: what can be read in print
+GAP = 0.04  # inches: above the line that says what a figure is of
 
 WIDEST, HANDLE, LINE = 62, 10, 0.13  # letters of a legend in one column, of a line before its name; inches of a row
 NARROW = 2000  # ratio of the ends of a logarithmic axis below which 2 and 5 are written too
@@ -38,7 +43,7 @@ STYLE = {
     "lines.linewidth": 1.2,
     "lines.markersize": 3.5,
     "legend.frameon": False,
-    "savefig.dpi": 300,
+    "savefig.dpi": DOTS,
     "svg.hashsalt": "koop",
     "svg.fonttype": "none",
 }
@@ -97,10 +102,15 @@ def in_space(axes: Axes3D, names: Sequence[str], zoom: float) -> None:
         axis.set_major_locator(MaxNLocator(4))
 
 
+def symbol(name: str) -> str:
+    """A state as it is written: a letter with its index, or plain words."""
+    letter, _, index = name.partition("_")
+    return f"${letter}_{{{index}}}$" if len(letter) == 1 and index else name.replace("_", " ")
+
+
 def axis_label(name: str, unit: str) -> str:
-    """A state with its unit: a symbol with its index, or plain words."""
-    symbol, _, index = name.partition("_")
-    return f"${symbol}_{{{index}}}$ ({unit})" if len(symbol) == 1 and index else f"{name.replace('_', ' ')} ({unit})"
+    """A state with its unit."""
+    return f"{symbol(name)} ({unit})"
 
 
 def style() -> AbstractContextManager[None]:
@@ -115,9 +125,27 @@ UNDATED: dict[str, dict[str, None]] = {
 }
 
 
-def render(figure: Figure, image: str) -> bytes:
-    """The figure as a png, svg or pdf file; the same figure gives the same bytes."""
+def render(figure: Figure, image: str, line: str) -> bytes:
+    """The figure as a png, svg or pdf file, with a grey ``line`` in a strip of its own below all that is drawn; the
+    same figure gives the same bytes.
+    """
     target = io.BytesIO()
+    lines = wrap(line, LONGEST)
+    width, height = figure.get_size_inches()
     with style():
-        figure.savefig(target, format=image, metadata=UNDATED[image])
+        _fix(figure)
+        for i, text in enumerate(lines):
+            y = -(GAP + LINE * (i + 0.5)) / height
+            figure.text(0.99, y, text, ha="right", va="center", fontsize=SMALLEST, color=GUIDE)
+        whole = Bbox([[0, -GAP - LINE * len(lines) - GAP / 2], [width, height]])
+        figure.savefig(target, format=image, metadata=UNDATED[image], bbox_inches=whole)
     return target.getvalue()
+
+
+def _fix(figure: Figure) -> None:
+    """Lay the figure out for print, for good: what is saved of it is then more than itself."""
+    figure.set_dpi(DOTS)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for legend in figure.legends:
+        legend.set_bbox_to_anchor((0, 0, 1, 1), transform=figure.transFigure)

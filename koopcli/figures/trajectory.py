@@ -1,4 +1,4 @@
-"""One simulated trajectory: its path on the ground, its states and its inputs."""
+"""One simulated trajectory: its course on the ground, and its states and inputs as far as they change."""
 
 from __future__ import annotations
 
@@ -8,23 +8,30 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.colours import COLOURS, GUIDE
+from koopcli.figures.colours import COLOURS
 from koopcli.figures.drawing import Source, column, state_columns
-from koopcli.figures.style import COLUMN, axis_label, looks, style
+from koopcli.figures.style import COLUMN, SMALLEST, axis_label, looks, style, symbol
 from koopcli.records import ENDS, Array, Channels, FloatArray, Trajectories
 
 RIM = {"wheel_rate_f": "front", "wheel_rate_r": "rear"}
-HEADINGS = 12  # cars drawn along the path
+HEADINGS = 12  # cars drawn along the course
+STRETCHED = 4.0  # how many times larger a flat course is drawn across than along
+FLAT = 1 / 8  # height over width of a course that is stretched
+STILL = 1e-9  # of its size: what moves less is constant
+WIDTH, LOW, HIGH = 2.9, 0.55, 1.8  # inches: of the course, and its height at least and at most
+PANEL, BESIDES = 0.62, 0.8  # inches: the height of a panel, and of what is around them
 
 
 @dataclass(frozen=True)
 class Path:
     """``x`` (samples, n_x) at ``time`` (samples,) in s under ``u`` (samples - 1, n_u); ``ground`` (samples, 3): where
     the centre of gravity is in m, and the heading in rad; ``lateral`` (samples,) acceleration in m/s²; ``rim``: speed
-    of the rim in m/s of every wheel that has a rate; ``end``: why it ended early, if it did.
+    of the rim in m/s of every wheel that has a rate; ``cones`` (c, 2) of the course in m; ``end``: why it ended early,
+    if it did.
     """
 
     time: FloatArray
@@ -33,6 +40,7 @@ class Path:
     ground: FloatArray
     lateral: FloatArray
     rim: Mapping[str, FloatArray]
+    cones: FloatArray
     end: str
     state_channels: Channels
     input_channels: Channels
@@ -60,6 +68,7 @@ def select(sources: Sequence[Source], settings: Plot) -> Path:
         ground=_ground(x, t.dt),
         lateral=np.gradient(x[:, 1], t.dt) + x[:, 2] * x[:, 0],
         rim={label: radius * x[:, names.index(name)] for name, label in RIM.items() if name in names},
+        cones=np.array([(cone.X, cone.Y) for cone in settings.cones]).reshape(-1, 2),
         end=end,
         state_channels=t.state_channels,
         input_channels=t.input_channels,
@@ -78,7 +87,7 @@ def _summed(rate: FloatArray, dt: float) -> FloatArray:
 
 
 def numbers(shown: Path) -> Mapping[str, Array]:
-    """Time, place, states and lateral acceleration; the inputs, each from its own sample on."""
+    """Time, place, states, lateral acceleration; the inputs, each from its own sample on; cones, if there are any."""
     return {
         "time": column(shown.time, "sample", "s"),
         "X": column(shown.ground[:, 0], "sample", "m"),
@@ -87,72 +96,111 @@ def numbers(shown: Path) -> Mapping[str, Array]:
         **state_columns(shown.x, shown.state_channels, "sample"),
         "lateral acceleration": column(shown.lateral, "sample", "m/s^2"),
         **state_columns(shown.u, shown.input_channels, "step"),
+        **{f"cone {name}": column(at, "cone", "m") for name, at in zip("XY", shown.cones.T, strict=True) if len(at)},
     }
 
 
+@dataclass(frozen=True)
+class _Panel:
+    """Lines over time by what they are called, with the ``name`` and the ``unit`` of all; ``held``: as steps."""
+
+    name: str
+    unit: str
+    lines: Mapping[str, FloatArray]
+    held: bool = False
+
+    @property
+    def moving(self) -> dict[str, FloatArray]:
+        """The lines that change."""
+        return {name: v for name, v in self.lines.items() if np.ptp(v) > STILL * np.abs(v).max()}
+
+
 def draw(shown: Path) -> Figure:
-    """The path from above with the car along it, then one panel for each state of the body, and for inputs by unit."""
-    units = list(dict.fromkeys(shown.input_channels.units))
-    rows = 5 + len(units)
+    """The course from above with the car along it, then a panel for each state of the body and for inputs by unit;
+    what never changes has none.
+    """
+    every = _panels(shown)
+    panels = [panel for panel in every if panel.moving]
+    reach = np.concatenate([shown.ground[:, :2], shown.cones])
+    across, up = np.maximum(np.ptp(reach, axis=0), 1e-3) * [1.1, 1.3]
+    stretched = STRETCHED if up < FLAT * across else 1.0
+    high = float(np.clip(WIDTH * stretched * up / across, LOW, HIGH))
     with style():
-        figure = Figure(figsize=(COLUMN, 1.5 + 0.8 * (rows - 1)), layout="constrained")
-        panels = figure.subplots(rows, height_ratios=[1.6, *([1] * (rows - 1))])
-        _draw_path(panels[0], shown)
-        speed, across, yaw, side, *inputs = panels[1:]
-        for axes in panels[2:]:
-            axes.sharex(speed)
-        speed.plot(shown.time, shown.x[:, 0], label="car", color=COLOURS[0])
-        for (label, rim), look in zip(shown.rim.items(), looks(3)[1:], strict=False):
-            speed.plot(shown.time, rim, label=f"{label} rim", **look)
-        for axes, i in ((across, 1), (yaw, 2)):
-            axes.plot(shown.time, shown.x[:, i], color=COLOURS[0])
-        side.plot(shown.time, shown.lateral, color=COLOURS[0])
-        for i, axes in enumerate((speed, across, yaw)):
-            axes.set_ylabel(_two_lines(shown.state_channels.names[i], shown.state_channels.units[i]))
-        side.set_ylabel(_two_lines("a_y", "m/s²"))
-        for axes, unit in zip(inputs, units, strict=True):
-            _draw_inputs(axes, shown, unit)
-        for axes in (speed, *inputs):
-            if len(axes.lines) > 1:
-                axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        for axes in panels[1:-1]:
-            axes.tick_params(labelbottom=False)
-        panels[-1].set_xlabel("time (s)")
-        figure.align_ylabels(panels[1:])
+        figure = Figure(figsize=(COLUMN, high + PANEL * len(panels) + BESIDES), layout="constrained")
+        course, *axes_of = figure.subplots(1 + len(panels), height_ratios=[high, *([PANEL] * len(panels))])
+        _draw_course(course, shown, stretched)
+        course.set_title("\n".join(_notes(shown, every)), fontsize=SMALLEST)
+        for axes, panel in zip(axes_of, panels, strict=True):
+            axes.sharex(axes_of[0]) if axes is not axes_of[0] else None
+            axes.tick_params(labelbottom=axes is axes_of[-1])
+            _draw_panel(axes, shown.time, panel)
+        if axes_of:
+            axes_of[-1].set_xlabel("time (s)")
+        figure.align_ylabels(axes_of)
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # the solver's last digits move from run to run with so many panels
-        for axes in panels:
+        for axes in (course, *axes_of):
             axes.set_position(np.round(axes.get_position(original=True).bounds, 5))
     return figure
 
 
-def _draw_path(axes: Axes, shown: Path) -> None:
+def _panels(shown: Path) -> list[_Panel]:
+    """What there is to draw over time, moving or not."""
+    names, units = shown.state_channels.names, shown.state_channels.units
+    body = [{"car": shown.x[:, 0], **{f"{label} rim": v for label, v in shown.rim.items()}}]
+    body += [{names[i]: shown.x[:, i]} for i in (1, 2)]
+    found = [_Panel(names[i], units[i], lines) for i, lines in enumerate(body)]
+    found.append(_Panel("a_y", "m/s²", {"a_y": shown.lateral}))
+    inputs = list(zip(shown.input_channels.names, shown.input_channels.units, shown.u.T, strict=True))
+    for unit in dict.fromkeys(shown.input_channels.units):
+        lines = {name: np.append(u, u[-1]) for name, one, u in inputs if one == unit}
+        panel = _Panel("input", unit, lines, held=True)
+        moving = list(panel.moving)
+        found.append(_Panel(moving[0], unit, lines, held=True) if len(moving) == 1 else panel)
+    return found
+
+
+def _notes(shown: Path, panels: Sequence[_Panel]) -> list[str]:
+    """What is said above the course: why it ends, and what is held constant other than at zero."""
+    found = [f"ends at {shown.time[-1]:.2f} s: it {shown.end}"] if shown.end else []
+    held: dict[str, list[str]] = {}
+    for panel in panels:
+        for name in panel.lines.keys() - panel.moving.keys():
+            if value := panel.lines[name][0]:
+                held.setdefault(f"{value:.3g} {panel.unit}", []).append(symbol(name))
+    constant = "; ".join(f"{', '.join(sorted(names))} {value}" for value, names in held.items())
+    return [*found, f"constant: {constant}"] if constant else found
+
+
+def _draw_course(axes: Axes, shown: Path, stretched: float) -> None:
     X, Y, heading = shown.ground.T
     axes.plot(X, Y, color=COLOURS[0])
     for k in np.unique(np.linspace(0, len(X) - 1, HEADINGS).astype(int)):
-        nose = (3, 0, np.rad2deg(heading[k]) - 90)  # a triangle that points ahead
-        axes.plot(X[k], Y[k], marker=nose, color=COLOURS[1], markersize=5)
-    axes.plot(X[0], Y[0], "o", color=GUIDE, markersize=2.5)
-    axes.set_aspect("equal", adjustable="datalim")
+        seen = np.arctan2(stretched * np.sin(heading[k]), np.cos(heading[k]))
+        nose = (3, 0, np.rad2deg(seen) - 90)  # a triangle that points ahead
+        axes.plot(X[k], Y[k], marker=nose, color=COLOURS[0], markersize=5)
+    axes.plot(*shown.cones.T, "^", color=COLOURS[1], markersize=3.5, markeredgewidth=0, zorder=3)
+    axes.margins(y=0.15)
+    axes.set_aspect(stretched, adjustable="datalim")
     axes.set_xlabel("X (m)")
-    axes.set_ylabel("Y (m)")
-    if shown.end:
-        axes.set_title(f"ends at {shown.time[-1]:.2f} s: it {shown.end}", fontsize=7)
+    axes.set_ylabel("Y (m)" if stretched == 1 else f"Y, {stretched:g} : 1\n(m)")
+    axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
 
 
-def _draw_inputs(axes: Axes, shown: Path, unit: str) -> None:
-    """Inputs of one unit as steps; those that never move are left out beside others that do."""
-    channels = list(zip(shown.input_channels.names, shown.input_channels.units, shown.u.T, strict=True))
-    alike = [(name, values) for name, u, values in channels if u == unit]
-    moving = [(name, values) for name, values in alike if values.any()] or alike[:1]
-    for (name, values), look in zip(moving, looks(len(moving)), strict=True):
-        axes.step(shown.time, np.append(values, values[-1]), where="post", label=name.replace("_", " "), **look)
-    if len(moving) == 1:
-        axes.set_ylabel(_two_lines(moving[0][0], unit))
-    else:
-        axes.set_ylabel(_two_lines("input", unit))
-
-
-def _two_lines(name: str, unit: str) -> str:
-    """A label that is no longer than a low panel."""
-    return axis_label(name, unit).replace(" (", "\n(")
+def _draw_panel(axes: Axes, time: FloatArray, panel: _Panel) -> None:
+    """The lines that change; those of several are named above them."""
+    moving = panel.moving
+    for (name, values), look in zip(moving.items(), looks(len(moving)), strict=True):
+        axes.plot(time, values, drawstyle="steps-post" if panel.held else "default", label=symbol(name), **look)
+    axes.set_ylabel(axis_label(panel.name, panel.unit).replace(" (", "\n("))
+    axes.yaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
+    if len(moving) > 1:
+        axes.legend(
+            loc="lower right",
+            bbox_to_anchor=(1, 1),
+            ncols=len(moving),
+            borderaxespad=0.1,
+            borderpad=0,
+            handlelength=1.6,
+            columnspacing=1,
+        )

@@ -62,7 +62,7 @@ class Controls:
 @dataclass(frozen=True)
 class Manoeuvre:
     """What it is ``about`` in a line, its ``source``, its first ``speed`` in m/s and length in ``seconds``, and the
-    ``controls`` of the driver at a time in s.
+    ``controls`` of the driver at a time in s; ``cones``: where they stand, ahead and to the left of the start in m.
     """
 
     about: str
@@ -70,6 +70,7 @@ class Manoeuvre:
     speed: float
     seconds: float
     controls: Callable[[Driver, float], Controls]
+    cones: tuple[tuple[float, float], ...] = ()
 
     def inputs(self, driver: Driver, times: list[float]) -> list[list[float]]:
         """Inputs of the plant on wheels at each of ``times`` in s: steer, drive and brake in front, then behind."""
@@ -105,6 +106,24 @@ def _double_lane_change(driver: Driver, t: float) -> Controls:
         seconds = length / driver.speed
         steer += side * driver.steer(2 * math.pi * OFFSET / seconds**2) * _pulse(t, begin / driver.speed, seconds)
     return Controls(steer, (driver.cruise, driver.cruise))
+
+
+WIDTH = 1.8  # m, of a passenger car: no vehicle file has it
+LANES = (  # each ahead from and to, to the left by (m), and its width in widths of the car, with 0.25 m to spare
+    (0.0, CHANGES[0][0], 0.0, 1.1),
+    (CHANGES[0][0] + CHANGES[0][1], CHANGES[1][0], OFFSET, 1.2),
+    (CHANGES[1][0] + CHANGES[1][1], CHANGES[1][0] + CHANGES[1][1] + 15.0, 0.0, 1.3),
+)
+
+
+def _gates() -> tuple[tuple[float, float], ...]:
+    """Cones at both ends of every lane, on both sides of its middle."""
+    return tuple(
+        (ahead, left + side * (widths * WIDTH + 0.25) / 2)
+        for start, end, left, widths in LANES
+        for ahead in (start, end)
+        for side in (1, -1)
+    )
 
 
 SINE, DWELL = 0.7, 0.5  # Hz; s at the second peak
@@ -147,6 +166,7 @@ MANOEUVRES: dict[str, Manoeuvre] = {
         50 * KMH,
         9.0,
         _double_lane_change,
+        _gates(),
     ),
     "sine-with-dwell": Manoeuvre(
         "one sine of steer at .7 Hz, held for half a second at its second peak, coasting",

@@ -7,17 +7,20 @@ from dataclasses import dataclass
 from typing import Any
 
 from koopcli.checks import build
+from koopcli.config.driving import ManoeuvreSample
 from koopcli.config.experiment import Experiment
-from koopcli.config.pictures import ImageFormat, Plot, Series
+from koopcli.config.pictures import Cone, ImageFormat, Plot, Series
 from koopcli.config.samples import SAMPLED_FOR
 from koopcli.config.settings import Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError
 from koopcli.figures import source_digest
 from koopcli.figures.registry import FIGURES, FigureKind
+from koopcli.simulation.manoeuvres import MANOEUVRES
 from koopcli.stages import grid, recipes
 from koopcli.stages.base import Task
 from koopcli.stages.makers import LIFTED, MAKERS
 from koopcli.stages.naming import names, points
+from koopcli.stages.subject import of_tyres, subject
 from koopcli.vehicles.plants import PLANTS
 
 TAKES: dict[str, tuple[str, ...]] = {
@@ -139,8 +142,9 @@ def figure(
         for i, task in enumerate(artefacts)
         for role in kind.roles
     )
-    told = {field: TOLD[field](experiment) for field in kind.told}
-    about = {"figure": name, "format": image, "drawn_by": source_digest()}
+    told = {field: TOLD[field](experiment, artefacts) for field in kind.told}
+    of = of_tyres(experiment) if "tyres" in kind.told else subject(artefacts, simulated)
+    about = {"figure": name, "format": image, "drawn_by": source_digest(), "of": of}
     return Task("plot", build(Plot, {**about, "series": _series(kind, artefacts, experiment, labels), **told}), inputs)
 
 
@@ -228,8 +232,16 @@ def _series(
     return series
 
 
-TOLD: Mapping[str, Callable[[Experiment], Any]] = {
-    "restart": lambda experiment: experiment.plot.restart,
-    "trajectory": lambda experiment: experiment.plot.trajectory,
-    "tyres": recipes.tyres,
-}
+def _cones(artefacts: Sequence[Task]) -> tuple[Cone, ...]:
+    """Those of the manoeuvre that the trajectories drive, where it has any; to the other side for a negative scale."""
+    driven = [sample.settings for task in artefacts if (sample := task.find("sample")) is not None]
+    manoeuvres = [one for one in driven if isinstance(one, ManoeuvreSample)]
+    return tuple(Cone(X, Y if one.scale >= 0 else -Y) for one in manoeuvres for X, Y in MANOEUVRES[one.name].cones)
+
+
+TOLD: Mapping[str, Callable[[Experiment, Sequence[Task]], Any]] = {
+    "restart": lambda experiment, artefacts: experiment.plot.restart,
+    "trajectory": lambda experiment, artefacts: experiment.plot.trajectory,
+    "cones": lambda experiment, artefacts: _cones(artefacts),
+    "tyres": lambda experiment, artefacts: recipes.tyres(experiment),
+}  # fields of ``Plot`` that figures are told

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from koopcli import __version__
 from koopcli.checks import build
 from koopcli.config.pictures import Plot
 from koopcli.figures.drawing import Drawing
@@ -11,7 +12,7 @@ from koopcli.stages.base import Context, Cost, Inputs, Stage
 
 
 def _run(settings: Plot, inputs: Inputs, context: Context) -> Drawing:
-    return drawing(settings, inputs)
+    return drawing(settings, inputs, __version__)
 
 
 def _figures(drawing: Drawing) -> Meta:
@@ -20,7 +21,7 @@ def _figures(drawing: Drawing) -> Meta:
 
 STAGE = Stage(
     name="plot",
-    version=5,
+    version=6,
     settings=lambda values: build(Plot, values),
     run=_run,
     unpack=Drawing.unpack,

@@ -111,15 +111,31 @@ def test_eigenvalues_of_a_matrix_and_their_rates():
     assert shown.copies == 1
     assert np.sort_complex(shown.eigenvalues) == pytest.approx(np.sort_complex(np.linalg.eigvals(_predictor().A)))
     assert np.exp(shown.rates * 0.01) == pytest.approx(shown.eigenvalues)
-    circle, plane = spectrum.draw(shown).axes
-    points = [line for line in circle.lines if line.get_marker() in ("o", "^")]
-    assert sum(len(line.get_xdata()) for line in points) == 8
-    arc = circle.lines[0].get_xydata()
-    assert np.hypot(*arc.T) == pytest.approx(1)
-    (x0, x1), (y0, y1) = circle.get_xlim(), circle.get_ylim()
-    assert (y1 - y0) / (x1 - x0) == pytest.approx(circle.get_box_aspect())  # a circle looks like one
-    assert all(x0 <= z.real <= x1 and y0 <= z.imag <= y1 for z in shown.eigenvalues)
-    assert "1/s" in plane.get_xlabel()
+    plane, density = spectrum.draw(shown).axes
+    (rings,) = [line for line in plane.lines if line.get_marker() == "o"]
+    upper = shown.rates[shown.rates.imag >= 0]  # of a pair the half that is drawn
+    assert sorted(rings.get_xdata()) == pytest.approx(sorted(upper.imag / (2 * np.pi)))
+    assert sorted(rings.get_ydata()) == pytest.approx(sorted(-upper.real))
+    assert rings.get_label() == "8 that decay or stay"
+    assert (plane.get_xlabel(), plane.get_ylabel()) == ("frequency (Hz)", "damping (1/s)")
+    assert density.get_shared_y_axes().joined(plane, density)
+
+
+def test_rings_that_lie_on_one_another_are_counted():
+    """The bars hold every eigenvalue, each as often as it is there, in bins that are even on the axis of damping."""
+    rates = np.concatenate([np.full(500, -0.03), [-20.0, 0.0, 0.5]])
+    predictor = replace(_predictor(), A=np.diag(np.exp(0.01 * rates)))
+    shown = spectrum.select([Source("", None, {"predictor": predictor})], figure_settings("spectrum"))
+    numbers = {name: array.values for name, array in spectrum.numbers(shown).items()}
+    assert numbers["bin/count"].sum() == 503
+    low, high = numbers["bin/damping from"], numbers["bin/damping to"]
+    for damping, count in zip((0.03, 20.0, 0.0, -0.5), (500, 1, 1, 1), strict=True):
+        assert numbers["bin/count"][(low <= damping + 1e-9) & (damping - 1e-9 < high)].sum() >= count
+    (bars,) = spectrum.draw(shown).axes[1].patches
+    assert bars.get_data().values.tolist() == numbers["bin/count"].tolist()
+    many = _looked_up()
+    twice = spectrum.select([Source("", None, {"predictor": many})], figure_settings("spectrum"))
+    assert twice.counts.sum() == 2 * len(many.A.rates)
 
 
 def test_eigenvalues_of_modes_are_those_of_one_block():
@@ -135,10 +151,11 @@ def test_growing_eigenvalues_are_told_apart_and_a_zero_has_no_rate():
     predictor = replace(_predictor(), A=np.diag([1.5, 0.5, 0.0, 0.5, 0.5, 0.5, 0.5, 1.0]))
     shown = spectrum.select([Source("", None, {"predictor": predictor})], figure_settings("spectrum"))
     assert np.sort(shown.rates.real)[0] == -np.inf
-    circle, plane = spectrum.draw(shown).axes
-    growing = [line for line in circle.lines if line.get_marker() == "^"]
-    assert growing[0].get_xdata().tolist() == [1.5]
+    plane, _density = spectrum.draw(shown).axes
+    (growing,) = [line for line in plane.lines if line.get_marker() == "^"]
+    assert growing.get_ydata() == pytest.approx([-np.log(1.5) / 0.01])
     assert sum(len(line.get_xdata()) for line in plane.lines if line.get_marker() in ("o", "^")) == 7
+    assert shown.counts.sum() == 7
 
 
 def test_random_input_takes_any_predictor(plant):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 
 from koopcli.errors import InvalidValueError
 from koopcli.figures import (
@@ -19,6 +21,7 @@ from koopcli.figures import (
     rmse_histogram,
 )
 from koopcli.figures.drawing import Source
+from koopcli.figures.ends import apart
 from koopcli.koopman import edmd
 from koopcli.koopman.bases import Choice
 from koopcli.koopman.evaluation import evaluate
@@ -44,17 +47,36 @@ def shown_by(module, *records):
     return module.select(sources, figure_settings(name))
 
 
-def test_every_initial_state_with_its_error_the_largest_on_top(made):
-    shown = shown_by(error_map, made)
-    assert (np.diff(shown.rmse) >= 0).all()
-    space, above, _bar = error_map.draw(shown).axes
-    (balls,), (discs,) = space.collections, above.collections
-    assert np.sort(np.asarray(balls._offsets3d)) == pytest.approx(np.sort(shown.x0.T))
-    assert discs.get_offsets().tolist() == shown.x0[:, :2].tolist()
-    assert (np.diff(discs.get_sizes()) >= 0).all()
-    colours = discs.get_facecolors()
-    assert (np.diff(colours[:, :3].sum(axis=1)) <= 1e-9).all()  # darker the larger
+def test_a_bin_of_the_slice_has_the_mean_of_its_states(made):
+    """Recomputed state by state from the evaluation; the balls are all states, the largest errors last."""
+    evaluation = replace(made["evaluation"], **of_many(600))
+    shown = shown_by(error_map, {"evaluation": evaluation})
+    numbers = {name: array.values for name, array in error_map.numbers(shown).items()}
+    (low,), (high,) = numbers["slice/v_y from"], numbers["slice/v_y to"]
+    assert high - low == pytest.approx(np.ptp(evaluation.x0[:, 1]) / 3)
+    within = (evaluation.x0[:, 1] >= low) & (evaluation.x0[:, 1] <= high)
+    assert 20 < len(numbers["bin/mean rmse"]) < 100
+    for i, mean in enumerate(numbers["bin/mean rmse"]):
+        inside = within.copy()
+        for name, state in (("v_x", 0), ("yaw_rate", 2)):
+            start, end = numbers[f"bin/{name} from"][i], numbers[f"bin/{name} to"][i]
+            inside &= (evaluation.x0[:, state] >= start) & (evaluation.x0[:, state] <= end)
+        assert inside.sum() == numbers["bin/states"][i] >= 3
+        assert evaluation.rmse[inside].mean() == pytest.approx(mean)
+    cut, space, _bar = error_map.draw(shown).axes
+    (mesh,), (balls,) = cut.collections, space.collections
+    assert mesh.get_array().compressed() == pytest.approx(numbers["bin/mean rmse"])
+    assert np.sort(np.asarray(balls._offsets3d)) == pytest.approx(np.sort(evaluation.x0.T))
+    assert (np.diff(shown.balls.rmse) >= 0).all()
     assert balls.get_facecolors()[:, 3].min() < 0.5 < balls.get_facecolors()[:, 3].max()  # small ones hide nothing
+
+
+def of_many(n):
+    """Fields of an evaluation of ``n`` states in a ball, errors that fall with the speed."""
+    x0 = np.random.default_rng(0).normal(size=(n, 3))
+    x0 *= (10 * np.cbrt(np.linspace(0.01, 1, n)) / np.linalg.norm(x0, axis=1))[:, np.newaxis]
+    whole = {"distance": np.linspace(0.0, 1.0, n) ** 2, "outside": np.arange(n) % 50 == 0}
+    return {"x0": x0, "rmse": 30 / (1 + np.abs(x0[:, 0])), "diverged": np.zeros(n, dtype=bool), **whole}
 
 
 def test_the_side_has_the_training_trajectories(made):
@@ -127,11 +149,47 @@ def test_the_error_over_time_is_the_rmse_taken_apart(made):
     assert np.sqrt((of_one.median**2).mean()) == pytest.approx(made["evaluation"].rmse[0])
 
 
-def test_several_horizons_are_medians_told_apart(made):
-    curves = shown_by(horizon, made, made)
-    axes = horizon.draw(curves).axes[0]
-    assert [line.get_label() for line in axes.lines] == ["predictor 0", "predictor 1"]
+def test_several_horizons_are_named_at_the_ends_of_their_lines(made):
+    """The first thick and in colour, the others grey; no name lies over another although the lines end in one place."""
+    curves = shown_by(horizon, made, made, made)
+    figure = horizon.draw(curves)
+    (axes,) = figure.axes
+    assert not figure.legends
     assert not axes.collections  # no bands
+    names = [f"predictor {i}" for i in range(3)]
+    drawn, leaders = axes.lines[:3], axes.lines[3:]
+    assert [line.get_label() for line in drawn] == [text.get_text() for text in axes.texts] == names
+    own, *others = drawn
+    assert own.get_linewidth() > 2 * max(line.get_linewidth() for line in others)
+    red, green, blue = np.array([to_rgb(line.get_color()) for line in others]).T
+    assert (red == green).all()
+    assert (green == blue).all()
+    for leader, curve in zip(leaders, curves, strict=True):
+        end = axes.transAxes.transform(leader.get_xydata()[0])
+        assert axes.transData.inverted().transform(end) == pytest.approx([curve.time[-1], curve.median[-1]])
+    figure.draw_without_rendering()
+    places = sorted(text.get_window_extent().intervaly.tolist() for text in axes.texts)
+    assert all(below[1] < above[0] for below, above in pairwise(places))
+
+
+def test_one_horizon_names_its_median_and_the_ends_of_its_band(made):
+    (axes,) = horizon.draw(shown_by(horizon, made)).axes
+    assert [text.get_text() for text in axes.texts] == ["90 % are below", "median", "10 % are below"]
+    assert len(axes.collections) == 1
+
+
+@pytest.mark.parametrize(
+    ("wanted", "heights", "places"),
+    [
+        ([0.2, 0.6], [0.1, 0.1], [0.2, 0.6]),  # nothing in the way
+        ([0.5, 0.5], [0.2, 0.2], [0.4, 0.6]),
+        ([0.52, 0.5], [0.2, 0.2], [0.61, 0.41]),  # in their order
+        ([0.9, 2.0], [0.2, 0.2], [0.7, 0.9]),  # back from the edge
+        ([0.5, 0.5, 0.5, 0.1], [0.1, 0.1, 0.1, 0.1], [0.4, 0.5, 0.6, 0.1]),
+    ],
+)
+def test_names_stand_as_near_to_their_ends_as_they_can(wanted, heights, places):
+    assert apart(np.array(wanted), np.array(heights)) == pytest.approx(places)
 
 
 def test_predictors_side_by_side(made):
@@ -151,16 +209,34 @@ def test_predictors_side_by_side(made):
     assert "3 diverged" in compare.draw([counted]).axes[0].get_yticklabels()[0].get_text()
 
 
-def test_error_against_distance(made):
-    evaluation = made["evaluation"]
-    shown = shown_by(density, made)
-    assert shown.distance.tolist() == evaluation.distance.tolist()
-    assert len(shown.typical) == 20
-    first = np.argsort(evaluation.distance)[:3]
-    assert shown.typical[0] == pytest.approx([np.median(evaluation.distance[first]), np.median(evaluation.rmse[first])])
-    axes = density.draw(shown).axes[0]
-    drawn = sum(len(line.get_xdata()) for line in axes.lines if line.get_marker() in ("o", "^"))
-    assert drawn == 60
+def test_bands_of_quantiles_end_where_the_data_end(made):
+    """The quantiles of every group recomputed from the evaluation; groups of few states are joined."""
+    evaluation = replace(made["evaluation"], **of_many(600))
+    shown = shown_by(density, {"evaluation": evaluation})
+    numbers = {name: array.values for name, array in density.numbers(shown).items()}
+    low, high = numbers["group/distance from"], numbers["group/distance to"]
+    assert (low[0], high[-1]) == (evaluation.distance.min(), evaluation.distance.max())
+    assert low[1:].tolist() == high[:-1].tolist()
+    for i in range(len(low)):
+        last = i == len(low) - 1
+        group = (evaluation.distance >= low[i]) & ((evaluation.distance < high[i]) | last)
+        assert group.sum() >= density.FEWEST
+        for q in (10, 25, 50, 75, 90):
+            assert numbers[f"group/rmse {q} %"][i] == pytest.approx(np.percentile(evaluation.rmse[group], q))
+    (axes,) = density.draw(shown).axes
+    outer, inner, median = axes.patches
+    for band, below, above in ((outer, 10, 90), (inner, 25, 75), (median, None, 50)):
+        data = band.get_data()
+        assert data.edges.tolist() == [*low, high[-1]]
+        assert data.values.tolist() == numbers[f"group/rmse {above} %"].tolist()
+        assert below is None or data.baseline.tolist() == numbers[f"group/rmse {below} %"].tolist()
+    (marks,) = axes.lines
+    assert len(marks.get_xdata()) == evaluation.outside.sum() == 12
+
+
+def test_few_states_are_one_group(made):
+    shown = shown_by(density, {"evaluation": replace(made["evaluation"], **of_many(25))})
+    assert shown.quantiles.shape == (5, 1)
 
 
 @pytest.mark.parametrize("mesh", ["sphere", "fibonacci"])

@@ -15,9 +15,10 @@ import numpy as np
 
 from koopcli.checks import build
 from koopcli.config.driving import DriveSample, ManoeuvreSample
-from koopcli.config.pictures import Plot, Series, Tyres
+from koopcli.config.pictures import Cone, Plot, Series, Subject, Tyres
 from koopcli.config.samples import BallSample, BoxSample, EllipsoidSample, GreedySample, GridSample, PointSample
 from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Simulate, Sweep, SweepAxis
+from koopcli.config.shipped import fingerprint, used_by
 from koopcli.figures.registry import FIGURES
 from koopcli.koopman.baselines import Forecast
 from koopcli.koopman.coverage import Coverage
@@ -201,6 +202,7 @@ def figure_settings(name: str) -> Plot:
     told = {
         "restart": 3,
         "trajectory": 1,
+        "cones": (Cone(0.0, 1.0), Cone(0.0, -1.0)),
         "tyres": tuple(
             Tyres(label, loads, 0.9, 2 * (CAR.lateral,), 2 * (CAR.longitudinal,))
             for label, loads in (("even", (3000.0, 3000.0)), ("nose-heavy", (4000.0, 3000.0)))
@@ -212,6 +214,7 @@ def figure_settings(name: str) -> Plot:
             "figure": name,
             "format": "png",
             "drawn_by": "",
+            "of": Subject((fingerprint(CAR, used_by("slips")),), ("EDMD, order 1",)),
             "series": tuple(Series(label, i + 3 if kind.draws == "points" else None) for i, label in enumerate(labels)),
             **{field: told[field] for field in kind.told},
         },

@@ -1,0 +1,40 @@
+"""What a vehicle is called where only its parameters are known: the shipped vehicles that have them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, fields, is_dataclass
+
+from koopcli.config.data import data_folder
+from koopcli.config.plants import UNUSED
+from koopcli.vehicles.parameters import VehicleParameters, read_vehicle
+
+DIGITS = 4  # of the digest, in what a vehicle is called that is not shipped
+
+
+@dataclass(frozen=True)
+class Fingerprint:
+    """Which parameters of a vehicle are known, by their ``names``, and the ``digest`` of their values."""
+
+    names: tuple[str, ...]
+    digest: str
+
+
+def fingerprint(source: object, names: tuple[str, ...]) -> Fingerprint:
+    """That of the parameters ``names`` of ``source``: a vehicle, or settings that hold some of one."""
+    values = {name: getattr(source, name) for name in names}
+    plain = {name: asdict(value) if is_dataclass(value) else value for name, value in values.items()}  # type: ignore[arg-type]
+    return Fingerprint(names, hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest())
+
+
+def used_by(plant: str) -> tuple[str, ...]:
+    """The parameters that trajectories of the ``plant`` tell."""
+    return tuple(f.name for f in fields(VehicleParameters) if f"vehicle.{f.name}" not in UNUSED[plant])
+
+
+def called(known: Fingerprint) -> str:
+    """Every shipped vehicle that has these parameters, else "own vehicle" and the first digits of their digest."""
+    shipped = {path.stem: read_vehicle(path) for path in sorted((data_folder() / "vehicles").glob("*.toml"))}
+    alike = [name for name, vehicle in shipped.items() if fingerprint(vehicle, known.names) == known]
+    return " or ".join(alike) or f"own vehicle {known.digest[:DIGITS]}"

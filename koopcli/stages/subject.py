@@ -1,0 +1,54 @@
+"""What a figure is of: the vehicles and predictors behind the artefacts that it draws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+from koopcli.config.experiment import Experiment
+from koopcli.config.pictures import Subject
+from koopcli.config.samples import OF_VEHICLE
+from koopcli.config.settings import Simulate
+from koopcli.config.shipped import Fingerprint, fingerprint, used_by
+from koopcli.errors import UnknownNameError
+from koopcli.stages import recipes
+from koopcli.stages.base import Task
+from koopcli.stages.makers import MAKERS, prospect
+
+
+def subject(artefacts: Sequence[Task], simulated: Callable[[Task], Simulate]) -> Subject:
+    """The vehicles and predictors behind ``artefacts``, as far as their records are known, each once.
+
+    ``simulated`` finds the simulation behind a predictor whose trajectories are gone.
+    """
+    steps = list(dict.fromkeys(step for task in artefacts for step in task.upstream()))
+    predictors = [step for step in steps if step.stage in MAKERS]
+    vehicles = dict.fromkeys(_simulations(steps, predictors, simulated)) or dict.fromkeys(_samples(steps))
+    return Subject(tuple(vehicles), tuple(prospect(one).name for one in predictors))
+
+
+def of_tyres(experiment: Experiment) -> Subject:
+    """The vehicles whose tyres are drawn."""
+    there = (one.vehicle for _, one in recipes.vehicles(experiment))
+    return Subject(tuple(dict.fromkeys(fingerprint(vehicle, recipes.OF_TYRES) for vehicle in there)))
+
+
+def _simulations(
+    steps: Sequence[Task], predictors: Sequence[Task], simulated: Callable[[Task], Simulate]
+) -> Iterator[Fingerprint]:
+    known = [step.settings for step in steps if step.stage == "simulate"]
+    if not known:
+        for one in predictors:
+            try:
+                known.append(simulated(one))
+            except UnknownNameError:  # its record is gone too
+                continue
+    for settings in known:
+        yield fingerprint(settings.vehicle, used_by(settings.plant))
+
+
+def _samples(steps: Sequence[Task]) -> Iterator[Fingerprint]:
+    """What samples hold of a vehicle where nothing was simulated."""
+    for step in steps:
+        names = tuple(name for name in OF_VEHICLE if hasattr(step.settings, name))
+        if step.stage == "sample" and names:
+            yield fingerprint(step.settings, names)
