@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pathlib import Path
 
+__all__ = ["__version__", "load"]
 __version__ = "0.1.0"
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from koopcli.blocks import Blocks, Chosen, Joined
+from koopcli.content import Content
 from koopcli.errors import InvalidValueError
 
 FloatArray = npt.NDArray[np.float64]
@@ -20,8 +21,8 @@ IntArray = npt.NDArray[np.int64]
 Meta = dict[str, Any]  # what JSON can hold
 
 
-@dataclass(frozen=True)
-class Array:
+@dataclass(frozen=True, eq=False, repr=False)
+class Array(Content):
     """Values with one name per axis and the unit (or one unit per column of the last axis)."""
 
     values: Blocks
@@ -29,8 +30,8 @@ class Array:
     units: str
 
 
-@dataclass(frozen=True)
-class Packed:
+@dataclass(frozen=True, eq=False, repr=False)
+class Packed(Content):
     """A record taken apart for storage: named arrays, and small facts as JSON."""
 
     arrays: Mapping[str, Array]
@@ -56,6 +57,9 @@ class Channels:
         """The units as one text, for a stored array."""
         return ", ".join(self.units)
 
+    def __str__(self) -> str:
+        return ", ".join(f"{name} ({unit})" for name, unit in zip(self.names, self.units, strict=True))
+
     def pack(self) -> Meta:
         """The channels as JSON."""
         return {"names": list(self.names), "units": list(self.units)}
@@ -66,8 +70,8 @@ class Channels:
         return cls(tuple(meta["names"]), tuple(meta["units"]))
 
 
-@dataclass(frozen=True)
-class Sample:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sample(Content):
     """Initial states and inputs.
 
     ``factors``: per state the values of a grid, or empty; then ``states`` (n, n_x) holds the initial states.
@@ -81,6 +85,10 @@ class Sample:
     crossed: bool
     state_channels: Channels
     input_channels: Channels
+
+    def __repr__(self) -> str:
+        rows = f" × {len(self.inputs)} rows of inputs" if self.crossed else ""
+        return f"Sample: {self.starts} states{rows}\n{_channels(self)}"
 
     @property
     def x0(self) -> FloatArray:
@@ -154,8 +162,8 @@ class Sample:
         )
 
 
-@dataclass(frozen=True)
-class Course:
+@dataclass(frozen=True, eq=False, repr=False)
+class Course(Content):
     """How the integration of n trajectories went.
 
     ``steps`` (n,): the last sample that each has a state at; ``reason`` (n,): why it ended there, a place in ``ENDS``,
@@ -192,8 +200,8 @@ ENDS = (
 )  # why trajectories end
 
 
-@dataclass(frozen=True)
-class Trajectories:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectories(Content):
     """Sampled trajectories: ``x`` (n, steps+1, n_x), ``u`` (n, steps, n_u) with u_k acting from k to k+1, ``dt`` in s.
 
     ``product = (states, input rows)`` says that the trajectories are every state with every input row, state-major.
@@ -219,6 +227,11 @@ class Trajectories:
 
     def __len__(self) -> int:
         return self.x.shape[0]
+
+    def __repr__(self) -> str:
+        early = 0 if self.course is None else int((~self.course.finished).sum())
+        ended = f", {early} of them ended early" if early else ""
+        return f"Trajectories: {len(self)} × {self.steps} steps of {self.dt:g} s{ended}\n{_channels(self)}"
 
     @property
     def steps(self) -> int:
@@ -272,6 +285,10 @@ class Trajectories:
             plant=packed.meta["plant"],
             course=Course.unpack(packed.arrays),
         )
+
+
+def _channels(record: Sample | Trajectories) -> str:
+    return f"  states {record.state_channels}\n  inputs {record.input_channels}"
 
 
 def _rows(values: Blocks, kept: BoolArray) -> Blocks:

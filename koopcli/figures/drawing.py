@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from koopcli.config.pictures import Plot, Series
+from koopcli.content import Content
 from koopcli.errors import InvalidValueError
 from koopcli.records import Array, BoolArray, Channels, FloatArray, Packed
 
@@ -36,8 +37,8 @@ def sources_of(settings: Plot, inputs: Mapping[str, Any]) -> list[Source]:
     return [Source(one.label, one.at, records[i]) for i, one in enumerate(series)]
 
 
-@dataclass(frozen=True)
-class Drawing:
+@dataclass(frozen=True, eq=False, repr=False)
+class Drawing(Content):
     """``numbers``: what is drawn, by column; ``image``: the rendered file of ``format``."""
 
     figure: str

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from koopcli.content import Content
 from koopcli.koopman.coverage import Coverage
 from koopcli.progress import Progress, silent
 from koopcli.records import Channels, FloatArray, Meta, Packed
@@ -16,8 +17,8 @@ TERMS = 15  # with a norm of at most ½ the next one is 1e-17
 DIFFERENCE = 1e-5  # in units of the state or input, of the central differences behind a Jacobian
 
 
-@dataclass(frozen=True)
-class Forecast:
+@dataclass(frozen=True, eq=False, repr=False)
+class Forecast(Content):
     """``hold`` keeps the first state, ``rotation`` turns the velocity at a constant yaw rate (8.1), ``linearisation``
     follows ẋ = f(x0, 0) + J (x - x0) + J_u u (8.2).
 

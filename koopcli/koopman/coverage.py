@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from koopcli.content import Content
 from koopcli.koopman.modes import IndexArray
 from koopcli.records import Array, BoolArray, FloatArray, Packed
 
@@ -17,8 +18,8 @@ GOLDEN = (5**0.5 - 1) / 2
 ROUNDING = 1e-9  # of a half-width: a state on the hull is inside it
 
 
-@dataclass(frozen=True)
-class Coverage:
+@dataclass(frozen=True, eq=False, repr=False)
+class Coverage(Content):
     """``states`` (m, n_x) a spread choice of training states, ``domain`` (2, n_x) the smallest and largest of all.
 
     ``facets`` (f, n_x + 1) the convex hull of all of them in half-widths of the domain (its box, where they lie in a

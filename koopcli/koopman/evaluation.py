@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from koopcli.content import Content
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import metrics
 from koopcli.koopman.coverage import Coverage
@@ -53,8 +54,8 @@ class Forecaster(Protocol):
         """One step from ``x`` (n, n_x), lifted afresh, under ``u`` (n, n_u)."""
 
 
-@dataclass(frozen=True)
-class Evaluation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Evaluation(Content):
     """Scores of n trajectories: ``rmse``, ``rmse_printed``, ``rmse_relift`` (n,) in percent, and ``start_error`` (n,),
     that of the prediction at k = 0 alone; ``max_error`` (n, n_x) the largest error of each state; ``in_domain`` (n,)
     the share of true samples inside the training box; ``distance`` (n,) of x0 to the training states in half-widths
@@ -83,6 +84,13 @@ class Evaluation:
     functions: int
     state_channels: Channels
     restart: int | None = None
+
+    def __repr__(self) -> str:
+        rmse, lost = metrics.summary(self.rmse[~self.diverged]), int(self.diverged.sum())
+        return (
+            f"Evaluation: {len(self.rmse)} predictions of {self.steps} steps, RMSE mean {rmse['mean']:.4g} %, median "
+            f"{rmse['median']:.4g} %, max {rmse['max']:.4g} %{f'; {lost} diverged' if lost else ''}"
+        )
 
     def figures(self) -> Meta:
         """The figures that scripts read (`--json`)."""

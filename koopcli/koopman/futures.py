@@ -7,6 +7,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from koopcli.content import Content
 from koopcli.koopman.frames import FRAMES
 from koopcli.koopman.lifts import Observed
 from koopcli.koopman.modes import IndexArray, Modes
@@ -18,8 +19,8 @@ LARGEST_TABLE = 3e8  # bytes of what follows all nodes; a larger one is not made
 GATHERED = 128  # states whose nodes' futures are then put together at once
 
 
-@dataclass(frozen=True)
-class Futures:
+@dataclass(frozen=True, eq=False, repr=False)
+class Futures(Content):
     """ψ(x): the exponentials that fit the interpolated future of x best (7.16).
 
     ``trajectories`` (J, samples, n_x); ``nodes``: those of their samples that are looked up; ``frame``: in which what

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from koopcli.content import Content
 from koopcli.records import Array, BoolArray, FloatArray, Packed
 
 STILL = 64 * np.finfo(float).eps  # of its size: an input that moves by no more is still
 
 
-@dataclass(frozen=True)
-class WhiteInputs:
+@dataclass(frozen=True, eq=False, repr=False)
+class WhiteInputs(Content):
     """w = (u - ``mean``) ``T`` with the mean square I: what the inputs determine, and no more (4.5).
 
     ``T`` (n_u, r); ``singular`` values of the scaled inputs, one for each that is ``moving`` (n_u,): what never moves

@@ -8,14 +8,15 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from koopcli.content import Content
 from koopcli.records import FloatArray
 
 ComplexArray = npt.NDArray[np.complex128]
 IndexArray = npt.NDArray[np.intp]
 
 
-@dataclass(frozen=True)
-class Modes:
+@dataclass(frozen=True, eq=False, repr=False)
+class Modes(Content):
     """A that repeats one small block ``copies`` times, the block given by its continuous rates (7.2).
 
     ``rates`` (L,) in 1/s, a complex one followed by its conjugate; ``couplings`` (L-1,) in 1/s: how each state drives

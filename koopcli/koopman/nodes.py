@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from koopcli.content import Content
 from koopcli.koopman.lookup import LOOKUPS, Lookup, check_nodes, search
 from koopcli.koopman.lookup.cloud import Cloud
 from koopcli.koopman.modes import IndexArray
@@ -18,8 +19,8 @@ SMALLEST = 1e-4  # of a voxel, in units of place
 TINY = 1e-12
 
 
-@dataclass(frozen=True)
-class Search:
+@dataclass(frozen=True, eq=False, repr=False)
+class Search(Content):
     """How nodes are looked up: ``kind`` of ``LOOKUPS``, with how many ``neighbours`` (None: as the kind has it) and
     their ``spacing`` (see ``Cloud``), of how many ``nodes`` kept for each trajectory (None: all).
 
@@ -42,8 +43,8 @@ class Search:
         return np.asarray(y * radius ** (self.power - 1))
 
 
-@dataclass(frozen=True)
-class Nodes:
+@dataclass(frozen=True, eq=False, repr=False)
+class Nodes(Content):
     """Which samples of trajectories are looked up: ``states`` (N, n_x), and their numbers ``kept`` (N,) among the
     first ``samples`` samples of each, trajectory by trajectory.
     """

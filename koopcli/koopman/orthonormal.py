@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from koopcli.content import Content
 from koopcli.errors import InvalidValueError
 from koopcli.records import Array, FloatArray
 
 
-@dataclass(frozen=True)
-class OrthonormalPolynomials:
+@dataclass(frozen=True, eq=False, repr=False)
+class OrthonormalPolynomials(Content):
     """Polynomials p_0 = 1, …, p_k with Σ_i w_i p_a(t_i) p_b(t_i) = [a = b] for weights that sum to one.
 
     ``s = (t - centre) / scale`` maps the nodes to [-1, 1]; the recurrence (3.1) is

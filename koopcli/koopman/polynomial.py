@@ -11,6 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
+from koopcli.content import Content
 from koopcli.koopman.lifts import Observed
 from koopcli.koopman.modes import IndexArray
 from koopcli.koopman.moments import Products, products_of
@@ -36,8 +37,8 @@ class Axis(Protocol):
         """The polynomials as arrays, none of monomials."""
 
 
-@dataclass(frozen=True)
-class Polynomial:
+@dataclass(frozen=True, eq=False, repr=False)
+class Polynomial(Content):
     """Products p_a(x_1) p_b(x_2) … with the degrees of each in a row of ``degrees`` (N, n_x) (docs/equations.md 3).
 
     The rows are downward closed, so that the span does not depend on where a state has its origin; the first is zero,

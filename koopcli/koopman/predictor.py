@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from koopcli.content import Content
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import responses
 from koopcli.koopman.bases import STORED
@@ -25,8 +26,8 @@ TABLES: dict[str, type[Tabulated] | type[Futures]] = {table.kind: table for tabl
 EXTRAPOLATES = "continue the functions fitted inside"
 
 
-@dataclass(frozen=True)
-class Predictor:
+@dataclass(frozen=True, eq=False, repr=False)
+class Predictor(Content):
     """z⁺ = A z + B u, x̂ = C z with z = ψ(x): eqs. (4.1), (4.2) of docs/equations.md. A bilinear one adds Σ_i u_i N_i z
     (4.6), or steps by its ``generator`` (4.9), of which A, B and N are then the value and the slope at u = 0.
 
@@ -57,6 +58,23 @@ class Predictor:
     beyond: str = EXTRAPOLATES
     trust: Trust | None = None
     solved_by: str = ""
+
+    def __repr__(self) -> str:
+        """Its spectral radius is told where it is known already, or costs nothing."""
+        known = isinstance(self.A, Modes) or "spectral_radius" in vars(self)
+        radius = f", spectral radius {self.spectral_radius:.6f}" if known else ""
+        ahead = "" if self.horizon is None else f", {self.horizon} at most"
+        return (
+            f"Predictor: {self.dynamics}, {self.functions} functions ({type(self.observables).__name__}), "
+            f"steps of {self.dt:g} s{ahead}{radius}\n  states {self.state_channels}\n  inputs {self.input_channels}"
+        )
+
+    @property
+    def dynamics(self) -> str:
+        """How its lifted state moves on, in a word or two."""
+        if self.N is None:
+            return "linear by rates" if isinstance(self.A, Modes) else "linear"
+        return "bilinear" if self.generator is None else "bilinear by a generator"
 
     @property
     def functions(self) -> int:

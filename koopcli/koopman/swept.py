@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from koopcli.content import Content
 from koopcli.koopman.modes import IndexArray
 from koopcli.records import Array, FloatArray, Meta, Packed
 
@@ -24,8 +25,8 @@ COUNTS = ("functions", "trajectories", "diverged")
 REPEATS = "seed"  # the last name of a setting that only draws again
 
 
-@dataclass(frozen=True)
-class Swept:
+@dataclass(frozen=True, eq=False, repr=False)
+class Swept(Content):
     """Of each cell its place on each of the axes ``names``, as ``places`` (cells, axes) into their ``values``, -1 where
     a setting has no effect, and the ``scores`` (cells,) by column: errors in percent, and counts.
     """

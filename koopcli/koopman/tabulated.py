@@ -7,14 +7,15 @@ from functools import cached_property
 
 import numpy as np
 
+from koopcli.content import Content
 from koopcli.koopman.lifts import Observed
 from koopcli.koopman.modes import IndexArray, Modes
 from koopcli.koopman.nodes import Nodes
 from koopcli.records import Array, FloatArray, Packed
 
 
-@dataclass(frozen=True)
-class Tabulated:
+@dataclass(frozen=True, eq=False, repr=False)
+class Tabulated(Content):
     """ψ(x) = Σ weights · ψ of samples near x, which have theirs from the initial states of their trajectories (7.6).
 
     ``states`` (J, K, n_x): the samples k = 0..K-1 of J trajectories, ``nodes`` those of them that are looked up;

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from koopcli.content import Content
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.lifts import Observed
 from koopcli.records import Array, FloatArray, Packed
@@ -46,8 +47,8 @@ def _k_means(x: FloatArray, count: int, seed: int) -> FloatArray:
 PLACEMENTS: dict[str, Callable[[FloatArray, int, int], FloatArray]] = {"k-means": _k_means, "drawn": draw_centres}
 
 
-@dataclass(frozen=True)
-class ThinPlate:
+@dataclass(frozen=True, eq=False, repr=False)
+class ThinPlate(Content):
     """1, the states, and r² log r about ``centres`` (M, n_x), in half-widths ``scale`` (n_x,) from the ``middle``.
 
     The constant and the states stand for what splines cannot say exactly; they come first.

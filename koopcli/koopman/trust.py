@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from koopcli.content import Content
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.coverage import spread
 from koopcli.koopman.futures import Futures
@@ -25,8 +26,8 @@ NEIGHBOURS = 15  # of these, whose errors are averaged
 SMALLEST = 1e-6  # percent: errors are compared by their logarithms
 
 
-@dataclass(frozen=True)
-class Trust:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trust(Content):
     """An estimate of the error at any state: the mean, by logarithms, of the errors at the nearest ``states``
     (m, n_x), which were found with their own trajectories held back: ``errors`` (m,) in percent.
 

@@ -8,6 +8,8 @@ from typing import Any
 from koopcli.stages.recorded import content_of
 from koopcli.store import Store, store_root
 
+__all__ = ["read"]
+
 
 def read(name: str, store: str | Path | None = None) -> Any:
     """The record named ``name`` (or an unambiguous prefix), verified; see ``koopcli.load``."""

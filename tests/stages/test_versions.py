@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from dataclasses import replace
 
@@ -58,6 +59,19 @@ def test_a_small_change_of_any_stage_is_found(stage_and_made, pins):
                 break
     else:
         pytest.fail("no toy has an array that a change would show in")
+
+
+def test_what_a_stage_makes_is_shown_in_few_words_and_equal_to_itself_alone(stage_and_made):
+    """Every kind of record, read twice; one value of it off by the last bit."""
+    stage, found = stage_and_made
+    packed = [one for one, _ in found.values()]
+    records = [STAGES[stage].unpack(one) for one in packed]
+    for record, one in zip(records, packed, strict=True):
+        assert record == STAGES[stage].unpack(one)
+        assert len(repr(record)) < 600
+        assert repr(record).count("\n") < 3
+    if dataclasses.is_dataclass(records[0]):
+        assert all(a != b for i, a in enumerate(records) for b in records[:i] if a.pack() != b.pack())
 
 
 def test_a_changed_result_without_a_changed_version_is_found(calm, monkeypatch):
