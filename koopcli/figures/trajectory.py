@@ -122,7 +122,7 @@ def draw(shown: Path) -> Figure:
     every = _panels(shown)
     panels = [panel for panel in every if panel.moving]
     reach = np.concatenate([shown.ground[:, :2], shown.cones])
-    across, up = np.maximum(np.ptp(reach, axis=0), 1e-3) * [1.1, 1.3]
+    across, up = np.maximum(np.ptp(reach, axis=0), 1e-3) * [1.1, 1.44]
     stretched = STRETCHED if up < FLAT * across else 1.0
     high = float(np.clip(WIDTH * stretched * up / across, LOW, HIGH))
     with style():
@@ -180,7 +180,7 @@ def _draw_course(axes: Axes, shown: Path, stretched: float) -> None:
         nose = (3, 0, np.rad2deg(seen) - 90)  # a triangle that points ahead
         axes.plot(X[k], Y[k], marker=nose, color=COLOURS[0], markersize=5)
     axes.plot(*shown.cones.T, "^", color=COLOURS[1], markersize=3.5, markeredgewidth=0, zorder=3)
-    axes.margins(y=0.15)
+    axes.margins(y=0.22)
     axes.set_aspect(stretched, adjustable="datalim")
     axes.set_xlabel("X (m)")
     axes.set_ylabel("Y (m)" if stretched == 1 else f"Y, {stretched:g} : 1\n(m)")

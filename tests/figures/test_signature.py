@@ -58,7 +58,7 @@ def test_several_are_counted_and_named_where_there_is_room(of, line):
 
 def test_a_line_of_the_most_letters_fits_the_column_and_a_longer_one_takes_another():
     text = ("eigenfunctions, polyharmonic " * 3)[:LONGEST]
-    wide = TextPath((0, 0), text, prop=FontProperties("DejaVu Sans", size=style.SMALLEST)).get_extents().width
+    wide = TextPath((0, 0), text, prop=FontProperties(family="DejaVu Sans", size=style.SMALLEST)).get_extents().width
     assert wide < 0.98 * 72 * style.COLUMN
 
     def height(line):

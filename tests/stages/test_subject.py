@@ -32,9 +32,7 @@ def test_vehicle_and_predictor_of_every_artefact_each_once():
     higher = recipes.evaluation(recipes.with_order(experiment, 4))
     assert said(evaluation, higher) == (bodies, ["EDMD, order 3", "EDMD, order 4"])
     assert said(recipes.sample(experiment.sample("ellipsoid"))) == (bodies, [])  # by mass and yaw inertia
-    other = recipes.test_set(
-        experiment.with_vehicle("bmw-320i"), experiment.with_vehicle("bmw-320i").simulate.settled()
-    )
+    other = recipes.simulation(experiment.with_vehicle("bmw-320i"), plant="forces")
     elsewhere = recipes.evaluation(experiment, fit, other)
     assert said(elsewhere) == ([*bodies, "bmw-320i"], ["EDMD, order 3"])
 
