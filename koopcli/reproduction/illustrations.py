@@ -23,7 +23,7 @@ from koopcli.store import Record
 class Illustration:
     """A picture of a report: its ``drawing`` with its ``record`` and those of what it ``draws``, or why there is none.
 
-    ``command`` makes it.
+    ``command`` makes it; one that ``leads`` may open the report.
     """
 
     figure: str
@@ -34,6 +34,7 @@ class Illustration:
     record: Record | None
     draws: tuple[Record, ...]
     reason: str = ""
+    leads: bool = False
 
 
 def illustrate(method: Method, runs: Sequence[Run], pipeline: Pipeline) -> list[Illustration]:
@@ -58,15 +59,14 @@ def _illustration(run: Run, picture: Picture, pipeline: Pipeline) -> Illustratio
     try:
         made = pipeline.make(picture.task)
     except InvalidValueError as error:
-        return Illustration(name, picture.caption, run.label, "", None, None, (), str(error))
+        return Illustration(name, picture.caption, run.label, "", None, None, (), str(error), picture.leads)
     main = FIGURES[name].roles[:1]  # the artefact itself comes first
     inputs = {tuple(key.split("/")): one for key, one in made.record.lineage.items()}
     names = [one for (_, role), one in sorted(inputs.items(), key=lambda item: int(item[0][0])) if (role,) == main]
     found = (pipeline.store.record(*one.split("/")) for one in names)
     draws = tuple(one for one in found if one is not None)
-    return Illustration(
-        name, picture.caption, run.label, command(run, picture, draws), made.content, made.record, draws
-    )
+    making = command(run, picture, draws)
+    return Illustration(name, picture.caption, run.label, making, made.content, made.record, draws, leads=picture.leads)
 
 
 def command(run: Run, picture: Picture, draws: Sequence[Record]) -> str:
