@@ -93,7 +93,8 @@ def reproduce(
     _refuse(call, chosen)
     runs = {one.name: _runs(call, base, one) for one in chosen}
     race = opening.race(chosen, runs[chosen[0].name][0])
-    everything = [task for one in chosen for run in runs[one.name] for task in report.tasks(one, run)]
+    plans = {one.name: [report.planned(one, run) for run in runs[one.name]] for one in chosen}
+    everything = [task for some in plans.values() for plan in some for task in plan.tasks]
     racing = _possible(call, race)
     if dry_run:
         steps = {step.task: step for task in (*everything, *racing) for step in call.pipeline.plan(task)}
@@ -105,8 +106,8 @@ def reproduce(
     with call.pipeline.workers:
         make_ahead(call.pipeline, [*everything, *racing])
         for one in chosen:
-            done = [report.run_cells(one, run, call.pipeline) for run in runs[one.name]]
-            parts.append(opening.Part(one, done, illustrate(one, done, call.pipeline)))
+            done = [report.run_cells(plan, call.pipeline) for plan in plans[one.name]]
+            parts.append(opening.Part(one, done, illustrate(plans[one.name], call.pipeline)))
         shown = ghosts.run(race, parts[0].runs[0].experiment, call.pipeline)
     _finish(call, method, parts, shown, racing, as_json=as_json)
 

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Sequence
 from html import escape
 
-NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:[ \u2009\u202f]\d{3})*(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
+NUMBER = re.compile(r"(?<![\w.])\(?[-−]?\d+(?:[ \u2009\u202f]\d{3})*(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])\)?")
 LEADS = re.compile(r"[±“]?[-−]?\d")
 NOTHING = ("", "–")
 
@@ -28,25 +28,27 @@ def aligned(cells: Sequence[str]) -> list[str]:
         kinds.setdefault(NUMBER.sub("#", cell), []).append(i)
     found = [""] * len(cells)
     for rows in kinds.values():
-        numbers = [[_halves(number) for number in NUMBER.findall(cells[i])] for i in rows]
-        widest = [tuple(max(half, key=len) for half in zip(*slot, strict=True)) for slot in zip(*numbers, strict=True)]
+        numbers = [NUMBER.findall(cells[i]) for i in rows]
+        slots = [[_halves(number) for number in slot] for slot in zip(*numbers, strict=True)]
+        widest = [tuple(max(half, key=len) for half in zip(*slot, strict=True)) for slot in slots]
         for i, own in zip(rows, numbers, strict=True):
             found[i] = "".join(_joined(NUMBER.split(cells[i]), own, widest))
     return found
 
 
 def _halves(number: str) -> tuple[str, str]:
-    """A number before and from its point, or from the sign of its power of ten."""
-    whole = re.match(r"[^.e]*", number)
+    """A number before and from its point, or from the sign of its power of ten, without its brackets."""
+    bare = number.strip("()")
+    whole = re.match(r"[^.e]*", bare)
     assert whole is not None
-    return whole[0], number[whole.end() :]
+    return whole[0], bare[whole.end() :]
 
 
-def _joined(texts: Sequence[str], own: Sequence[tuple[str, str]], widest: Sequence[tuple[str, ...]]) -> Iterator[str]:
+def _joined(texts: Sequence[str], own: Sequence[str], widest: Sequence[tuple[str, ...]]) -> Iterator[str]:
     yield escape(texts[0], quote=False)
-    for text, (whole, rest), (longest, fullest) in zip(texts[1:], own, widest, strict=True):
-        before = longest[: len(longest) - len(whole)]
-        after = fullest[len(rest) :]
+    for text, number, (longest, fullest) in zip(texts[1:], own, widest, strict=True):
+        whole, rest = _halves(number)
+        before, after = longest[: len(longest) - len(whole)], fullest[len(rest) :]
         pads = "".join(f' data-{side}="{pad}"' for side, pad in (("l", before), ("r", after)) if pad)
-        yield f"<span{pads}>{whole}{rest}</span>" if pads else whole + rest
+        yield f"<span{pads}>{number}</span>" if pads else number
         yield escape(text, quote=False)

@@ -49,7 +49,8 @@ def pictures(experiment: Experiment) -> list[Picture]:
     """The vehicle, errors against order, and one predictor in detail: the draw, order and inputs the paper states."""
     plan, excitation = experiment.reproduce, blocks.excitation(experiment)
     everywhere = blocks.trainings(experiment)
-    sweep = [(cell, task) for cell, task in cells(experiment) if cell.block == blocks.SWEEP]
+    every = list(cells(experiment))
+    sweep = [(cell, task) for cell, task in every if cell.block == blocks.SWEEP]
     first = everywhere[0].name
     chosen = {c: t for c, t in sweep if (c.draw, c.excitation) == (first, excitation)}
     orders = [order for order in plan.orders if order <= BEST_ORDERS[-1]] or list(plan.orders)
@@ -103,7 +104,7 @@ def pictures(experiment: Experiment) -> list[Picture]:
             f"Eigenvalues of the lifted system, order {orders[-1]}.",
         ),
     ]
-    many = [task for cell, task in cells(experiment) if cell.block == blocks.DRAWS]
+    many = [task for cell, task in every if cell.block == blocks.DRAWS]
     if many:
         found.append(Picture(draw("best-order", many), f"The best order over random draws ({INPUTS[excitation]})."))
     return found

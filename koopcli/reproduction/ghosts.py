@@ -21,7 +21,7 @@ from koopcli.vehicles.parameters import VehicleParameters
 from koopcli.vehicles.plants import remembered_plant
 from koopcli.vehicles.single_track import ForceInput
 
-SECONDS, SPEED = 1.0, 20.0  # of the swerve; s, m/s
+SECONDS, SPEED = 0.8, 20.0  # of the swerve; s, m/s
 SIDEWAYS = 0.9 * G  # largest lateral acceleration, m/s²
 INSIDE = 0.7  # of the half-widths of the training box: as far as the swerve goes
 LOST = 20.0  # m from the true car, from where a ghost is shown no longer

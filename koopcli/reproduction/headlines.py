@@ -64,7 +64,7 @@ def _edmd_clause(run: Run) -> str:
     counted = f"{count_text(linear['functions'])} polynomials (EDMD, order {order})"
     stated = f"{BEST_RMSE} % is the paper's best" if order in BEST_ORDERS else f"the paper's best is {BEST_RMSE} %"
     return (
-        f"Under random inputs {counted} {_misses(linear)} ({stated}), {bilinear['functions']} bilinear functions of "
+        f"Under random inputs, {counted} {_misses(linear)} ({stated}), {bilinear['functions']} bilinear functions of "
         f"the same data {_misses(bilinear)}"
     )
 

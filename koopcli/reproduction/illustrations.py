@@ -10,7 +10,7 @@ from koopcli.config.changes import flat, parse_set
 from koopcli.errors import InvalidValueError, UsageError
 from koopcli.figures.drawing import Drawing
 from koopcli.figures.registry import FIGURES, FigureKind
-from koopcli.reproduction.report import Method, Picture, Run
+from koopcli.reproduction.report import Picture, Plan, Run
 from koopcli.stages import drawn
 from koopcli.stages.base import Task
 from koopcli.stages.effects import why_idle
@@ -37,17 +37,17 @@ class Illustration:
     leads: bool = False
 
 
-def illustrate(method: Method, runs: Sequence[Run], pipeline: Pipeline) -> list[Illustration]:
-    """Make or find every picture of a method; one that two runs share is shown once.
+def illustrate(plans: Sequence[Plan], pipeline: Pipeline) -> list[Illustration]:
+    """Make or find every picture of the plans of a method; one that two runs share is shown once.
 
     What cannot be drawn, as an evaluation where every prediction diverged, is left out with the reason.
     """
     found = []
     wanted: dict[Task, tuple[Run, Picture]] = {}
-    for run in runs:
-        for picture in method.pictures(run.experiment):
-            wanted.setdefault(picture.task, (run, picture))
-    with pipeline.reporter.progress(f"figures of {method.name}") as progress:
+    for plan in plans:
+        for picture in plan.pictures:
+            wanted.setdefault(picture.task, (plan.run, picture))
+    with pipeline.reporter.progress(f"figures of {plans[0].method.name}") as progress:
         for i, (run, picture) in enumerate(wanted.values()):
             progress(i, len(wanted))
             found.append(_illustration(run, picture, pipeline))

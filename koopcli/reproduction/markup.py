@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Iterator, Sequence
 from functools import partial
 from html import escape
 from itertools import zip_longest
-from urllib.parse import quote
 
-from koopcli.figures.drawing import Drawing
 from koopcli.figures.registry import FIGURES
 from koopcli.reproduction.columns import aligned, is_numeric
 from koopcli.reproduction.illustrations import Illustration, provenance
+from koopcli.reproduction.images import address
 from koopcli.reproduction.report import Table
 
 FOLDED_BEYOND = 12  # artefacts named in a command
-IN_A_URI = " /:;=,()'-+.*!~@$?[]{}|^_"  # of SVG: what needs no escape inside an attribute
+
+COMMAND = "command"  # header of a column that holds some
 
 text = partial(escape, quote=False)
 
@@ -26,8 +25,12 @@ def table(shown: Table) -> str:
     columns = [list(column) for column in zip_longest(*shown.rows, fillvalue="")] or [[] for _ in shown.header]
     kinds = [not shown.words and i >= shown.left and is_numeric(column) for i, column in enumerate(columns)]
     cells = [
-        aligned(column) if numeric else [text(cell) for cell in column]
-        for column, numeric in zip(columns, kinds, strict=True)
+        [command(cell) for cell in column]
+        if name == COMMAND
+        else aligned(column)
+        if numeric
+        else [text(cell) for cell in column]
+        for name, column, numeric in zip(shown.header, columns, kinds, strict=True)
     ]
     marks = [' class="n"' if numeric else "" for numeric in kinds]
     head = "".join(f'<th scope="col"{mark}>{text(cell)}</th>' for cell, mark in zip(shown.header, marks, strict=True))
@@ -67,7 +70,7 @@ def figure(shown: Illustration, *, brief: bool = False) -> Iterator[str]:
     if shown.drawing is None:
         yield f'<p class="missing">Not drawn: {text(shown.reason)}.</p>'
     else:
-        yield f'<img src="{_address(shown.drawing)}" alt="{escape(FIGURES[shown.figure].about)}">'
+        yield f'<img src="{address(shown.drawing)}" alt="{escape(FIGURES[shown.figure].about)}">'
     yield f"<figcaption>{text(shown.caption)}{run}"
     if shown.drawing is not None:
         many = len(shown.draws) > FOLDED_BEYOND
@@ -81,14 +84,6 @@ def figure(shown: Illustration, *, brief: bool = False) -> Iterator[str]:
         yield from (f"<dt>{text(what)}</dt><dd>{text(said)}</dd>" for what, said in provenance(shown))
         yield "</dl></details>"
     yield "</figcaption></figure>"
-
-
-def _address(drawing: Drawing) -> str:
-    """The image itself as an address."""
-    if drawing.format == "svg":
-        drawn = " ".join(drawing.image.decode().split("\n"))
-        return f"data:image/svg+xml,{quote(drawn[drawn.index('<svg') :], safe=IN_A_URI)}"
-    return f"data:image/{drawing.format};base64,{base64.b64encode(drawing.image).decode()}"
 
 
 def listed(items: Sequence[str], kind: str) -> str:

@@ -104,7 +104,7 @@ def missing(parts: Sequence[Part], ghosts: Shown | str) -> Iterator[str]:
 
 def screen(shown: Opening) -> Iterator[str]:
     """The first screen as HTML."""
-    yield f'<header><div class="said"><h1>{TITLE}</h1><p class="sentence">{text(shown.sentence)}</p>'
+    yield f'<header><h1>{TITLE}</h1><div class="said"><p class="sentence">{text(shown.sentence)}</p>'
     yield f'<p class="about">{" · ".join(map(text, shown.about))}</p>'
     yield f'<div class="numbers">{table(shown.numbers)}</div></div>'
     if shown.picture is not None:

@@ -45,7 +45,7 @@
 
   const opened = [];
   addEventListener("beforeprint", () => {
-    for (const one of document.querySelectorAll("details:not([open])")) {
+    for (const one of document.querySelectorAll(".folded:not([open])")) {
       one.open = true;
       opened.push(one);
     }

@@ -17,7 +17,8 @@ from koopcli.stages.pipeline import Pipeline
 from koopcli.store import Record
 
 REDUCED = "This run is not of the paper's size: its numbers cannot be put beside the paper's."
-VECTORS: frozenset[FigureName] = frozenset({"single-track"})  # figures that are smaller as SVG, at the paper's size
+RASTERS: frozenset[FigureName] = frozenset({"error-map", "error-side", "energy-surface", "density", "spectrum"})
+# figures of thousands of marks, which are smaller as PNG at the paper's size; all others are smaller as SVG
 SMALLEST, LARGEST = 5, 6  # powers of ten between which numbers are written without one
 
 
@@ -126,23 +127,36 @@ class Method:
     """Settings of fits that some of its cells have a use for, whatever the experiment's own fit has."""
 
 
-def tasks(method: Method, run: Run) -> list[Task]:
-    """Everything a run makes: the evaluation of every cell, then the pictures."""
-    pictures = method.pictures(run.experiment)
-    return [*(task for _, task in method.cells(run.experiment)), *(picture.task for picture in pictures)]
+@dataclass(frozen=True)
+class Plan:
+    """What a run consists of: its cells, each with its evaluation, and its pictures."""
+
+    method: Method
+    run: Run
+    cells: Sequence[tuple[Any, Task]]
+    pictures: Sequence[Picture]
+
+    @property
+    def tasks(self) -> list[Task]:
+        """Everything that is made: the evaluation of every cell, then the pictures."""
+        return [*(task for _, task in self.cells), *(picture.task for picture in self.pictures)]
 
 
-def run_cells(method: Method, run: Run, pipeline: Pipeline) -> Run:
-    """Make or find every cell of a run that has none yet, with a progress display."""
-    scored = []
-    cells = list(method.cells(run.experiment))
-    with pipeline.reporter.progress(f"reproduce {method.name}, {run.label}") as progress:
-        for i, (cell, task) in enumerate(cells):
-            progress(i, len(cells))
+def planned(method: Method, run: Run) -> Plan:
+    """The plan of a run, which takes a while to say."""
+    return Plan(method, run, list(method.cells(run.experiment)), method.pictures(run.experiment))
+
+
+def run_cells(plan: Plan, pipeline: Pipeline) -> Run:
+    """Make or find every cell of a plan, with a progress display: the run with its scores."""
+    method, scored = plan.method, []
+    with pipeline.reporter.progress(f"reproduce {method.name}, {plan.run.label}") as progress:
+        for i, (cell, task) in enumerate(plan.cells):
+            progress(i, len(plan.cells))
             artefact = pipeline.make(task)
             measured = method.measure(pipeline, cell, task) if method.measure is not None else {}
             scored.append(Scored(cell, artefact.figures, artefact.record, measured))
-    return replace(run, scored=tuple(scored))
+    return replace(plan.run, scored=tuple(scored))
 
 
 def has_effect(name: str, *, plant: str, swept: Sequence[str], foreign: Sequence[str]) -> bool:
@@ -213,7 +227,7 @@ def drawer(experiment: Experiment) -> Callable[..., Task]:
     """``(figure, artefacts, labels=…)`` -> its task for the report of an experiment, in the format that is smaller."""
 
     def draw(figure: FigureName, artefacts: Sequence[Task], labels: Mapping[Task, str] | None = None) -> Task:
-        image: ImageFormat = "svg" if figure in VECTORS else "png"
+        image: ImageFormat = "png" if figure in RASTERS else "svg"
         return drawn.figure(figure, artefacts, image, experiment, labels=labels)
 
     return draw

@@ -45,9 +45,10 @@ def road(shown: Shown) -> Iterator[str]:
 
 def said(shown: Shown) -> str:
     """What drives the cars, and how far each ghost ends from the true one."""
-    ends = "; ".join(f"{track.label} ends {off_text(track, shown.dt)}" for track in shown.tracks[1:])
+    ends = "; ".join(f"{track.label} is {off_text(track, shown.dt)}{_most(track)}" for track in shown.tracks[1:])
     seconds = (len(shown.tracks[0].off) - 1) * shown.dt
-    return f"The true car and its ghosts: {shown.inputs}, {seconds:.3g} s. {ends}. The grid is of 1 m."
+    about = f"The true car and its ghosts over {seconds:.3g} s: {shown.inputs}. At the end {ends}."
+    return f"{about} Grid lines are 1 m apart."
 
 
 def off_text(track: Track, dt: float) -> str:
@@ -56,6 +57,13 @@ def off_text(track: Track, dt: float) -> str:
     if known == len(track.off):
         return f"{number_text(float(track.off[-1]))} m off"
     return f"more than {LOST:g} m off after {known * dt:.2f} s"
+
+
+def _most(track: Track) -> str:
+    """How far a ghost was off on the way, where that is more."""
+    if np.isnan(track.off).any() or track.off.max() <= 1.01 * track.off[-1]:
+        return ""
+    return f" (at most {number_text(float(track.off.max()))} m)"
 
 
 def _extent(shown: Shown) -> tuple[FloatArray, FloatArray]:
@@ -86,7 +94,7 @@ def _car(shown: Shown, i: int) -> str:
     rear, length = -p.l_r - OVERHANG, p.l_f + p.l_r + 2 * OVERHANG
     place = f"translate({x:.3f} {-y:.3f}) rotate({-math.degrees(heading):.2f})"
     body = f'<rect x="{rear:.2f}" y="{-HALF_WIDTH}" width="{length:.2f}" height="{2 * HALF_WIDTH}" rx=".35"/>'
-    glass = f'<rect x="{p.l_f - 0.7:.2f}" y="-.7" width=".6" height="1.4" rx=".2" fill="#fff" fill-opacity=".8"/>'
+    glass = f'<rect x="{p.l_f - 0.7:.2f}" y="-.7" width=".6" height="1.4" rx=".2" fill="#fff" fill-opacity=".7"/>'
     return f'<g class="car" data-car="{i}" fill="{COLOURS[i]}" transform="{place}">{body}{glass}</g>'
 
 
