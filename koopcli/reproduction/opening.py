@@ -106,10 +106,9 @@ def screen(shown: Opening) -> Iterator[str]:
     """The first screen as HTML."""
     yield f'<header><h1>{TITLE}</h1><div class="said"><p class="sentence">{text(shown.sentence)}</p>'
     yield f'<p class="about">{" · ".join(map(text, shown.about))}</p>'
-    yield f'<div class="numbers">{table(shown.numbers)}</div></div>'
+    yield f'<div class="numbers">{table(shown.numbers)}</div>{listed(shown.missing, "missing")}</div>'
     if shown.picture is not None:
         yield from figure(shown.picture, brief=True)
-    yield listed(shown.missing, "missing")
     if not isinstance(shown.ghosts, str):
         yield from road(shown.ghosts)
     yield "</header>"
