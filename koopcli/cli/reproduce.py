@@ -6,7 +6,6 @@ import hashlib
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -25,23 +24,17 @@ from koopcli.cli.options import (
 from koopcli.config.changes import SECTIONS, flat, nested
 from koopcli.config.experiment import load_experiment
 from koopcli.console import show_table
-from koopcli.errors import UsageError
+from koopcli.errors import KoopError, UsageError
 
 if TYPE_CHECKING:
+    from koopcli.reproduction.ghosts import Shown
     from koopcli.reproduction.illustrations import Illustration
-    from koopcli.reproduction.report import Method, Run
+    from koopcli.reproduction.opening import Part
+    from koopcli.reproduction.report import Method, Race, Run
+    from koopcli.stages.base import Task
 
 MethodName = Literal["all", "edmd", "eigen"]
 NOT_HERE = ("sample.kind", "test.kind", "simulate.plant", "baseline.kind", "evaluate.restart")
-
-
-@dataclass(frozen=True)
-class _Part:
-    """One method of a reproduction with its runs and its pictures."""
-
-    method: Method
-    runs: list[Run]
-    illustrations: list[Illustration]
 
 
 def reproduce(
@@ -74,13 +67,13 @@ def reproduce(
     dry_run: DryRunOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Reproduce the paper at full size and put its figures beside those found here: EDMD over orders, training grids
+    """Reproduce the paper at full size and put its numbers beside those found here: EDMD over orders, training grids
     and test inputs; eigenfunctions over readings of the text, two tyres, cuts, grip and baselines.
 
     The paper's claims about EDMD come first, each with a verdict and the command that shows it. Some two minutes and
     700 MB for both on two cores. What --set changes is shown beside the unmodified run. It ends with report.html, whose
-    path is printed: one page with the tables and every figure, each with the command that makes it. All of it is
-    pinned, with what it was made from.
+    path is printed: one page that opens with the main numbers and an animation of the predictors, then has every figure
+    with the command that makes it, and the tables. All of it is pinned, with what it was made from.
 
     Example: koop reproduce eigen --set vehicle.mu_scale=0.8
     """
@@ -88,7 +81,7 @@ def reproduce(
         raise UsageError("--smoke is an experiment of its own: leave out --experiment")
     base = "smoke" if smoke else experiment
     call = begin(store, base, set_, SECTIONS, {"reproduce": {"full": True if full else None}}, workers, cluster)
-    from koopcli.reproduction import report
+    from koopcli.reproduction import ghosts, opening, report
     from koopcli.reproduction.illustrations import illustrate
     from koopcli.reproduction.registry import BEYOND, METHODS
     from koopcli.stages.ahead import make_ahead
@@ -99,22 +92,36 @@ def reproduce(
     chosen += [BEYOND] if beyond else []
     _refuse(call, chosen)
     runs = {one.name: _runs(call, base, one) for one in chosen}
-    wanted = {one.name: [task for run in runs[one.name] for task in report.tasks(one, run)] for one in chosen}
-    call.say_what_vehicle([task for tasks in wanted.values() for task in tasks])
+    race = opening.race(chosen, runs[chosen[0].name][0])
+    plans = {one.name: [report.planned(one, run) for run in runs[one.name]] for one in chosen}
+    everything = [task for some in plans.values() for plan in some for task in plan.tasks]
+    call.say_what_vehicle(everything)
+    racing = _possible(call, race)
     if dry_run:
-        steps = {step.task: step for tasks in wanted.values() for task in tasks for step in call.pipeline.plan(task)}
+        steps = {step.task: step for task in (*everything, *racing) for step in call.pipeline.plan(task)}
         show_plan(list(steps.values()), as_json=as_json)
         return
-    everything = [task for tasks in wanted.values() for task in tasks]
     for task in everything:
         call.pipeline.check(task)
     parts = []
     with call.pipeline.workers:
-        make_ahead(call.pipeline, everything)
+        make_ahead(call.pipeline, [*everything, *racing])
         for one in chosen:
-            done = [report.run_cells(one, run, call.pipeline) for run in runs[one.name]]
-            parts.append(_Part(one, done, illustrate(one, done, call.pipeline)))
-    _finish(call, method, parts, as_json=as_json)
+            done = [report.run_cells(plan, call.pipeline) for plan in plans[one.name]]
+            parts.append(opening.Part(one, done, illustrate(plans[one.name], call.pipeline)))
+        shown = ghosts.run(race, parts[0].runs[0].experiment, call.pipeline)
+    _finish(call, method, parts, shown, racing, as_json=as_json)
+
+
+def _possible(call: Invocation, race: Race) -> list[Task]:
+    """The predictors of a race; none where one of them cannot be made, which the report says."""
+    tasks = [task for _, task in race.ghosts]
+    try:
+        for task in tasks:
+            call.pipeline.check(task)
+    except KoopError:
+        return []
+    return tasks
 
 
 def _refuse(call: Invocation, chosen: Sequence[Method]) -> None:
@@ -153,7 +160,9 @@ def _runs(call: Invocation, base: str, method: Method) -> list[Run]:
     return runs
 
 
-def _finish(call: Invocation, name: str, parts: Sequence[_Part], *, as_json: bool) -> None:
+def _finish(
+    call: Invocation, name: str, parts: Sequence[Part], shown: Shown | str, racing: Sequence[Task], *, as_json: bool
+) -> None:
     """Tables on stderr, the same with all figures on a page, its path on stdout."""
     from koopcli.store.pins import pin
 
@@ -169,9 +178,10 @@ def _finish(call: Invocation, name: str, parts: Sequence[_Part], *, as_json: boo
     label = f"reproduce-{name}-{_identity(parts)}"
     made = [scored.record for part in parts for run in part.runs for scored in run.scored]
     made += [one.record for part in parts for one in part.illustrations if one.record is not None]
+    made += [] if isinstance(shown, str) else [call.pipeline.make(task).record for task in racing]
     pin(call.pipeline.store, label, call.pipeline.with_inputs(made))
     call.console.note(f"pinned as {label}")
-    path = _write_report(call, name, parts)
+    path = _write_report(call, name, parts, shown)
     if as_json:
         runs = [_run_json(part.method, run) for part in parts for run in part.runs]
         figures = [_figure_json(part.method, one) for part in parts for one in part.illustrations]
@@ -180,18 +190,18 @@ def _finish(call: Invocation, name: str, parts: Sequence[_Part], *, as_json: boo
         print(path)
 
 
-def _identity(parts: Sequence[_Part]) -> str:
+def _identity(parts: Sequence[Part]) -> str:
     """What tells a report from others: the artefacts it shows."""
     names = [scored.record.name for part in parts for run in part.runs for scored in run.scored]
     names += [one.record.name for part in parts for one in part.illustrations if one.record is not None]
     return hashlib.sha256("\n".join(names).encode()).hexdigest()[:12]
 
 
-def _write_report(call: Invocation, name: str, parts: Sequence[_Part]) -> Path:
+def _write_report(call: Invocation, name: str, parts: Sequence[Part], shown: Shown | str) -> Path:
     from koopcli import __version__
+    from koopcli.reproduction.opening import opening
     from koopcli.reproduction.page import Section, page
     from koopcli.reproduction.report import full_table
-    from koopcli.reproduction.turnable import bundle
     from koopcli.store.files import publish, storage_errors
 
     root = call.pipeline.store.root
@@ -207,19 +217,17 @@ def _write_report(call: Invocation, name: str, parts: Sequence[_Part]) -> Path:
         )
         for part in parts
     ]
-    library = bundle()
-    if library is None:
-        call.console.note("the error map of the report is a picture; pip install 'koopcli[report]' for one to turn")
     beyond = ["--beyond"] if any(part.method.name == "beyond" for part in parts) else []
     command = shlex.join(["koop", "reproduce", name, *beyond, *_told(parts)])
-    content = page(sections, command, f"koop {__version__}", library).encode()
+    version = f"koop {__version__}"
+    content = page(opening(parts, shown, version), sections, command, version).encode()
     with storage_errors(root):
         if not path.is_file() or path.read_bytes() != content:
             publish(path, content, root / "tmp")
     return path
 
 
-def _told(parts: Sequence[_Part]) -> list[str]:
+def _told(parts: Sequence[Part]) -> list[str]:
     """Experiment and changes, as they are said on the command line."""
     runs = [run for part in parts for run in part.runs]
     experiment = [] if runs[0].base == "paper" else ["--experiment", runs[0].base]

@@ -1,4 +1,4 @@
-"""Eigenfunctions beyond the paper: the ladder from its figure to the best, what each step costs, and what it buys."""
+"""Eigenfunctions beyond the paper: the ladder from its error to the best, what each step costs, and what it buys."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 from koopcli.config.experiment import Experiment
 from koopcli.config.samples import BallSample, EllipsoidSample
 from koopcli.koopman.trust import LEVEL
-from koopcli.records import Meta
 from koopcli.reproduction import beyond_cells as blocks
+from koopcli.reproduction import headlines
 from koopcli.reproduction.eigen import FOREIGN
 from koopcli.reproduction.eigen_cells import ball, surface
 from koopcli.reproduction.report import (
@@ -23,10 +23,12 @@ from koopcli.reproduction.report import (
     Scored,
     Table,
     count_text,
+    drawer,
     has_effect,
+    number_text,
     score_text,
 )
-from koopcli.stages import drawn, recipes
+from koopcli.stages import recipes
 from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline
 
@@ -62,9 +64,9 @@ def _ladder(runs: Sequence[Run]) -> Table:
         ):
             found = [[_find(run, block, label, design, simulated, v, seed) for seed in seeds] for run, v in columns]
             one = next((first for first, *_ in found if first is not None), None)
-            scores = ["\n".join(_score(s.figures if s else None) for s in some) for some in found]
-            rows.append([design, label, f"{simulated:.0f} s", *_costs(one), *scores])
-    header = ["initial states", "rates, lift", "simulated", "lifted states", "build", "2 000 queries"]
+            scores = ["\n".join(score_text(s.figures if s else None) for s in some) for some in found]
+            rows.append([design, label, f"{simulated:.0f}", *_costs(one), *scores])
+    header = ["initial states", "rates, lift", "simulated (s)", "lifted states", "build (s)", "2 000 queries (s)"]
     header = [name.replace("2 000", count_text(ball(runs[0].experiment).count)) for name in header]
     header += [_column(run, vehicle) for run, vehicle in columns]
     said = "" if len(seeds) < 2 else f", seeds {' and '.join(map(str, seeds))} below one another"
@@ -77,7 +79,7 @@ def _costs(scored: Scored | None) -> list[str]:
     fit, query = scored.measured.get("build"), scored.measured.get("query")
     return [
         str(scored.figures["functions"]),
-        *("–" if one is None else f"{one:.2g} s" for one in (fit, query)),
+        *("–" if one is None else number_text(one, 2) for one in (fit, query)),
     ]
 
 
@@ -85,10 +87,10 @@ def _ablation(runs: Sequence[Run]) -> Table:
     columns = [(run, vehicle) for run in runs for vehicle in _vehicles(run, blocks.ABLATION)]
     seed = _seeds(runs[0])[0]
     best = [_best(run, v, seed) for run, v in columns]
-    rows = [["nothing: best-eigen", *(_score(one.figures if one else None) for one in best)]]
+    rows = [["nothing: best-eigen", *(score_text(one.figures if one else None) for one in best)]]
     for label in _labels(runs, blocks.ABLATION):
         found = [_first(run, blocks.ABLATION, label, v, seed) for run, v in columns]
-        rows.append([label, *(_score(one.figures if one else None) for one in found)])
+        rows.append([label, *(score_text(one.figures if one else None) for one in found)])
     title = "One ingredient taken away: RMSE in %, mean ± std (median)"
     return Table(title, ["instead", *(_column(run, v) for run, v in columns)], rows)
 
@@ -106,7 +108,7 @@ def _modes(runs: Sequence[Run]) -> Table:
                 for s in run.scored
                 if (s.cell.block, s.cell.label, s.cell.modes, s.cell.vehicle) == (blocks.MODES, label, modes, vehicle)
             ]
-            row.append(f"{found.measured['missed']:.3g} / {found.figures['rmse']['mean']:.3g}")
+            row.append(f"{number_text(found.measured['missed'])} / {number_text(found.figures['rmse']['mean'])}")
         rows.append(row)
     header = ["rates", "modes", *(_column(run, v) for run, v in columns)]
     return Table("How many modes: what the fit misses of the data / RMSE, in %", header, rows)
@@ -118,7 +120,7 @@ def _unseen(runs: Sequence[Run]) -> Table:
     for run in runs:
         for vehicle in _vehicles(run, blocks.UNSEEN):
             found = [_first(run, blocks.UNSEEN, None, vehicle, seed) for seed in seeds]
-            rows.append([_column(run, vehicle), *(_score(one.figures if one else None) for one in found)])
+            rows.append([_column(run, vehicle), *(score_text(one.figures if one else None) for one in found)])
     header = ["vehicle", *(f"seed {seed}" for seed in seeds)]
     return Table("best-eigen on vehicles that nothing was chosen on: RMSE in %", header, rows)
 
@@ -133,9 +135,9 @@ def _trust(runs: Sequence[Run]) -> Table:
                     if best is None or best.figures["bound"] is None:
                         continue
                     bound = best.figures["bound"]
-                    covered = f"{100 * bound['covered']:.1f} %"
-                    rows.append([_column(run, vehicle), str(seed), covered, f"{bound['median']:.3g} %"])
-    header = ["vehicle", "seed", "errors within their bounds", "median bound"]
+                    covered = f"{100 * bound['covered']:.1f}"
+                    rows.append([_column(run, vehicle), str(seed), covered, number_text(bound["median"])])
+    header = ["vehicle", "seed", "errors within their bounds (%)", "median bound (%)"]
     return Table(f"Trust: {100 * LEVEL:.0f} % bounds on the error from each test state, best-eigen", header, rows)
 
 
@@ -168,7 +170,7 @@ def pictures(experiment: Experiment) -> list[Picture]:
     """The frontier; of every vehicle errors before and after, modes and trust; and what each ingredient buys."""
     found = list(blocks.cells(experiment))
     seed = experiment.reproduce.seeds[0]
-    draw = partial(drawn.figure, image="png", experiment=experiment)
+    draw = drawer(experiment)
 
     def of(block: str, vehicle: str | None = None) -> list[tuple[blocks.Cell, Task]]:
         return [
@@ -217,10 +219,6 @@ def measure(pipeline: Pipeline, cell: blocks.Cell, task: Task) -> Mapping[str, f
     return found
 
 
-def _score(figures: Meta | None) -> str:
-    return score_text(figures)
-
-
 def _find(run: Run, block: str, label: str, design: str, simulated: float, vehicle: str, seed: int) -> Scored | None:
     wanted = (block, label, design, simulated, vehicle, seed)
     for scored in run.scored:
@@ -267,6 +265,7 @@ METHOD = Method(
     tables=tables,
     notes=notes,
     pictures=pictures,
+    lead=headlines.BEYOND,
     fixed={"test.seed": "reproduce.seeds=[4,5]", "test.ball.seed": "reproduce.seeds=[4,5]"},
     uses=partial(
         has_effect,

@@ -12,7 +12,7 @@ from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
 from koopcli.config.sampled import INPUTS
 from koopcli.records import Meta
 from koopcli.reproduction import edmd_cells as blocks
-from koopcli.reproduction.report import Run, Table
+from koopcli.reproduction.report import Run, Table, number_text
 
 CLEAR = 1.02  # a ratio of two mean errors from which one is called larger
 WORSE = 1.05  # the same, from the best order to the largest basis
@@ -95,7 +95,7 @@ def _draws(run: Run) -> list[str]:
 
 
 def _percent(value: float) -> str:
-    return f"{value:.3g} %" if math.isfinite(value) else "diverges"
+    return f"{number_text(value)} %" if math.isfinite(value) else "diverges"
 
 
 def _floor(run: Run) -> Finding:

@@ -11,10 +11,21 @@ from koopcli.config.sampled import INPUTS
 from koopcli.config.samples import BoxSample, GridSample
 from koopcli.records import Meta
 from koopcli.reproduction import edmd_cells as blocks
+from koopcli.reproduction import headlines
 from koopcli.reproduction.claims import claims_table, scores
 from koopcli.reproduction.edmd_cells import cells
-from koopcli.reproduction.report import REDUCED, Method, Picture, Run, Table, count_text, has_effect, score_text
-from koopcli.stages import drawn, grid
+from koopcli.reproduction.report import (
+    REDUCED,
+    Method,
+    Picture,
+    Run,
+    Table,
+    count_text,
+    drawer,
+    has_effect,
+    score_text,
+)
+from koopcli.stages import grid
 
 NOTES = (
     "The paper does not state the test inputs behind its {paper} %, so three kinds are scored: none, ±{amplitude} N "
@@ -30,7 +41,7 @@ NOTES = (
     "basis a smaller growth is left where training values are drawn at random: extrapolation beyond them in a few "
     "corners, which moves the mean and not the median.",
     "The paper states no yaw inertia either, and with held inputs the score follows it: --set vehicle.Jzz=1731 shows "
-    "how far. No parameter was chosen to print the paper's figure.",
+    "how far. No parameter was chosen to print the paper's number.",
 )
 
 
@@ -38,14 +49,15 @@ def pictures(experiment: Experiment) -> list[Picture]:
     """The vehicle, errors against order, and one predictor in detail: the draw, order and inputs the paper states."""
     plan, excitation = experiment.reproduce, blocks.excitation(experiment)
     everywhere = blocks.trainings(experiment)
-    sweep = [(cell, task) for cell, task in cells(experiment) if cell.block == blocks.SWEEP]
+    every = list(cells(experiment))
+    sweep = [(cell, task) for cell, task in every if cell.block == blocks.SWEEP]
     first = everywhere[0].name
     chosen = {c: t for c, t in sweep if (c.draw, c.excitation) == (first, excitation)}
     orders = [order for order in plan.orders if order <= BEST_ORDERS[-1]] or list(plan.orders)
     one = next(task for cell, task in chosen.items() if cell.order == orders[-1])
     some = [task for cell, task in chosen.items() if cell.order in orders and cell.order % 2 == orders[-1] % 2]
     kinds = {training.draw: training.name for training in reversed(everywhere)}.values()
-    draw = partial(drawn.figure, image="png", experiment=experiment)
+    draw = drawer(experiment)
     data = f"{first} draw, {INPUTS[excitation]}"
     about = f"order {orders[-1]}, {data}"
     restart = experiment.plot.restart
@@ -53,16 +65,17 @@ def pictures(experiment: Experiment) -> list[Picture]:
         Picture(draw("single-track", []), "The single-track vehicle; signs are those of ISO 8855."),
         Picture(
             draw("orders", list(chosen.values())),
-            f"Error against the order of the basis ({data}). The paper's two best "
-            "points are marked; it does not state the test inputs.",
+            f"Error against the order of the basis ({data}). The paper's two best points are marked; it does "
+            "not state the test inputs.",
         ),
         Picture(
             draw("orders", [task for cell, task in sweep if cell.draw in kinds]),
-            "The same means for every kind of test inputs: inputs, not the basis, set the floor.",
+            "Mean errors for every kind of test inputs: inputs, not the basis, set the floor.",
+            leads=True,
         ),
         Picture(
             draw("orders", [task for cell, task in sweep if cell.excitation == excitation]),
-            f"The same means for every training draw ({INPUTS[excitation]}).",
+            f"Mean errors for every training draw ({INPUTS[excitation]}).",
         ),
         *(
             [
@@ -91,7 +104,7 @@ def pictures(experiment: Experiment) -> list[Picture]:
             f"Eigenvalues of the lifted system, order {orders[-1]}.",
         ),
     ]
-    many = [task for cell, task in cells(experiment) if cell.block == blocks.DRAWS]
+    many = [task for cell, task in every if cell.block == blocks.DRAWS]
     if many:
         found.append(Picture(draw("best-order", many), f"The best order over random draws ({INPUTS[excitation]})."))
     return found
@@ -112,25 +125,26 @@ def tables(runs: Sequence[Run]) -> list[Table]:
 
 
 def paper_table(runs: Sequence[Run]) -> Table:
-    """The paper's figures beside each run's."""
+    """The paper's numbers beside each run's."""
     plan = runs[0].experiment.reproduce
     draw = blocks.trainings(runs[0].experiment)[0].name
     rows = [
         [
-            "training samples",
-            f"4·15^4 = {_samples(GridSample())}",
+            "training samples, 4·15^4 in the paper",
+            _samples(GridSample()),
             *(_samples(blocks.grid(run.experiment)) for run in runs),
+            "",
         ],
-        ["test trajectories", _tests(BoxSample()), *(_tests(blocks.box(run.experiment)) for run in runs)],
+        ["test trajectories × steps", _tests(BoxSample()), *(_tests(blocks.box(run.experiment)) for run in runs), ""],
     ]
     for excitation in plan.excitations:
         for order in BEST_ORDERS:
             if order in plan.orders:
                 label = f"RMSE, order {order}, {INPUTS[excitation]}"
-                found = [score_text(figures(run, draw, order, excitation), unit=" %") for run in runs]
-                rows.append([label, f"{BEST_RMSE} %", *found])
-    title = f"EDMD: paper versus here ({draw} draw)"
-    return Table(title, ["", "paper", *(run.label for run in runs)], rows)
+                found = [score_text(figures(run, draw, order, excitation)) for run in runs]
+                rows.append([label, f"{BEST_RMSE}", *found, "%"])
+    title = f"EDMD: paper versus here ({draw} draw), RMSE as mean ± std (median)"
+    return Table(title, ["", "paper", *(run.label for run in runs), "unit"], rows)
 
 
 def beside_table(runs: Sequence[Run]) -> Table:
@@ -146,7 +160,8 @@ def beside_table(runs: Sequence[Run]) -> Table:
             name = [block, counted] if i == 0 else ["", f"  {run.label}"]
             rows.append([*name, draw, *(score_text(found.get(e)) for e in plan.excitations)])
     header = ["", "predictor (N)", "training draw", *(INPUTS[e] for e in plan.excitations)]
-    return Table("Beside the polynomials: RMSE in %, mean ± std (median), with N functions", header, rows)
+    title = "Beside the polynomials: RMSE in %, mean ± std (median), with N functions"
+    return Table(title, header, rows, left=3)
 
 
 def order_tables(runs: Sequence[Run]) -> list[Table]:
@@ -167,7 +182,7 @@ def order_tables(runs: Sequence[Run]) -> list[Table]:
 
 
 def figures(run: Run, draw: str, order: int, excitation: str) -> Meta | None:
-    """The figures of a cell of the sweep, if the run has it."""
+    """The numbers of a cell of the sweep, if the run has it."""
     found = scores(run, blocks.SWEEP, draw=draw, order=order, excitation=excitation)
     return found[0][1] if found else None
 
@@ -187,6 +202,7 @@ METHOD = Method(
     tables=tables,
     notes=notes,
     pictures=pictures,
+    lead=headlines.EDMD,
     fixed={
         "fit-edmd.order": "reproduce.orders=[6,7]",
         "sample.draw": 'reproduce.draws=["even"]',

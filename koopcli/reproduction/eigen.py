@@ -12,6 +12,7 @@ from koopcli.config.paper import EIGEN_RMSE
 from koopcli.config.samples import BallSample, EllipsoidSample
 from koopcli.config.settings import FitEigen, Simulate
 from koopcli.records import Meta
+from koopcli.reproduction import headlines
 from koopcli.reproduction.eigen_cells import (
     BASELINES,
     CUTS,
@@ -32,17 +33,19 @@ from koopcli.reproduction.report import (
     Run,
     Table,
     count_text,
+    drawer,
     has_effect,
+    number_text,
     score_text,
 )
-from koopcli.stages import drawn, recipes
+from koopcli.stages import recipes
 
 SIZES = (count_text(EllipsoidSample.count), count_text(BallSample.count, BallSample.steps))  # the paper's
 
 
 def pictures(experiment: Experiment) -> list[Picture]:
     """Tyres and initial states, then the headline in detail, and beside it the other vehicles."""
-    draw = partial(drawn.figure, image="png", experiment=experiment)
+    draw = drawer(experiment)
     seed = experiment.reproduce.seeds[0]
     (name, there), *others = recipes.vehicles(experiment)
     headline = evaluated(there, there.fit_eigen, seed)
@@ -56,6 +59,7 @@ def pictures(experiment: Experiment) -> list[Picture]:
         Picture(
             draw("error-map", [headline]),
             f"Error by initial state, {name}: each ball is a test state, its size and colour the RMSE.",
+            leads=True,
         ),
         Picture(
             draw("error-side", [headline]),
@@ -67,8 +71,8 @@ def pictures(experiment: Experiment) -> list[Picture]:
         ),
         Picture(draw("rmse-histogram", [headline]), f"How the errors are distributed, {name}."),
         Picture(draw("density", [headline]), f"Error against the distance of the initial state to the data, {name}."),
-        Picture(draw("horizon", beside), f"Median error against time, {name}, beside what fits nothing and EDMD."),
-        Picture(draw("compare", beside), f"Errors beside what fits nothing and EDMD of the same trajectories, {name}."),
+        Picture(draw("horizon", beside), f"Median error against time, {name}, beside baselines and EDMD."),
+        Picture(draw("compare", beside), f"Errors beside baselines and EDMD of the same trajectories, {name}."),
         Picture(draw("spectrum", [headline.input("predictor")]), f"Eigenvalues of the lifted system, {name}."),
         *(picture for other, there in others for picture in _elsewhere(other, there, seed)),
     ]
@@ -76,13 +80,13 @@ def pictures(experiment: Experiment) -> list[Picture]:
 
 def _elsewhere(name: str, there: Experiment, seed: int) -> list[Picture]:
     """What is shown of a vehicle beside the main one."""
-    draw = partial(drawn.figure, image="png", experiment=there)
+    draw = drawer(there)
     headline = evaluated(there, there.fit_eigen, seed)
     return [
         Picture(draw("error-side", [headline]), f"Error by initial state from the side, {name}."),
         Picture(
             draw("compare", side_by_side(there, seed)),
-            f"Errors beside what fits nothing and EDMD of the same trajectories, {name}.",
+            f"Errors beside baselines and EDMD of the same trajectories, {name}.",
         ),
     ]
 
@@ -93,33 +97,35 @@ def tables(runs: Sequence[Run]) -> list[Table]:
 
 
 def _paper_table(runs: Sequence[Run]) -> Table:
-    """The headline on every vehicle, beside the paper's figure."""
+    """The headline on every vehicle, beside the paper's number."""
     columns = [(run, vehicle) for run in runs for vehicle in _vehicles(run)]
     found = [_figures(run, HEADLINE, None, vehicle, run.experiment.reproduce.seeds[0]) for run, vehicle in columns]
     mean, std = EIGEN_RMSE
     rows = [
-        ["trajectories from Γ", SIZES[0], *(count_text(surface(run.experiment).count) for run, _ in columns)],
-        ["test states × steps", SIZES[1], *(_tests(ball(run.experiment)) for run, _ in columns)],
-        ["RMSE", f"{mean:g} ± {std:g} %", *(_score(figures, unit=" %") for figures in found)],
+        ["trajectories from Γ", SIZES[0], *(count_text(surface(run.experiment).count) for run, _ in columns), ""],
+        ["test states × steps", SIZES[1], *(_tests(ball(run.experiment)) for run, _ in columns), ""],
+        ["RMSE", f"{mean:g} ± {std:g}", *map(score_text, found), "%"],
         *(
             [
                 f"  seed {seed}",
                 "–",
-                *(_score(_figures(run, HEADLINE, None, v, seed), unit=" %") for run, v in columns),
+                *(score_text(_figures(run, HEADLINE, None, v, seed)) for run, v in columns),
+                "%",
             ]
             for seed in runs[0].experiment.reproduce.seeds[1:]
         ),
-        ["error at k = 0", "seen, not stated", *(f"{f['start_error']['mean']:.3g} %" for f in found)],
-        ["RMSE as printed", "–", *(f"{f['rmse_printed']['mean']:.3g} %" for f in found)],
-        ["RMSE, re-lifted at each step", "–", *(f"{f['rmse_relift']['mean']:.3g} %" for f in found)],
-        ["lifted states", "–", *(str(f["functions"]) for f in found)],
+        ["error at k = 0", "seen, not stated", *(number_text(f["start_error"]["mean"]) for f in found), "%"],
+        ["RMSE as printed", "–", *(number_text(f["rmse_printed"]["mean"]) for f in found), "%"],
+        ["RMSE, re-lifted at each step", "–", *(number_text(f["rmse_relift"]["mean"]) for f in found), "%"],
+        ["lifted states", "–", *(str(f["functions"]) for f in found), ""],
         [
             "worst 5 % of states in the emptiest 5 %",
             "“areas with very little data”",
-            *(f"{100 * f['worst_in_emptiest']:.0f} %" for f in found),
+            *(f"{100 * f['worst_in_emptiest']:.0f}" for f in found),
+            "%",
         ],
     ]
-    header = ["", "paper", *(_column(run, vehicle) for run, vehicle in columns)]
+    header = ["", "paper", *(_column(run, vehicle) for run, vehicle in columns), "unit"]
     return Table(f"Eigenfunctions: paper versus here ({_about(runs[0].experiment.fit_eigen)})", header, rows)
 
 
@@ -129,18 +135,18 @@ def _readings(runs: Sequence[Run]) -> Table:
     labels = dict.fromkeys((s.cell.label, s.cell.seed) for run in runs for s in run.scored if s.cell.block == READINGS)
     rows = []
     for label, seed in labels:
-        found = [_score(_figures(run, READINGS, label, v, seed)) for run in runs for v in _vehicles(run)]
+        found = [score_text(_figures(run, READINGS, label, v, seed)) for run in runs for v in _vehicles(run)]
         name = label if seed == runs[0].experiment.reproduce.seeds[0] else f"  seed {seed}"
         rows.append([name, *found])
     return Table("Other readings, RMSE in %, mean ± std (median)", header, rows)
 
 
 def _cuts(runs: Sequence[Run]) -> Table:
-    """How far the smallest singular value kept moves the figure."""
+    """How far the smallest singular value kept moves the error."""
     main = [(run, run.experiment.vehicle_name) for run in runs]
     seed = runs[0].experiment.reproduce.seeds[0]
     rows = [
-        [label, *(_score(_figures(run, CUTS, label, vehicle, seed)) for run, vehicle in main)]
+        [label, *(score_text(_figures(run, CUTS, label, vehicle, seed)) for run, vehicle in main)]
         for label in _labels(runs, CUTS)
     ]
     header = ["boundary functions, cut", *(_column(run, vehicle) for run, vehicle in main)]
@@ -153,12 +159,12 @@ def _per_vehicle(runs: Sequence[Run], block: str) -> Table:
     seed = runs[0].experiment.reproduce.seeds[0]
     labels = _labels(runs, block)
     rows = [
-        ["eigenfunctions, as above", *(_score(_figures(run, HEADLINE, None, v, seed)) for run, v in columns)],
-        *([label, *(_score(_figures(run, block, label, v, seed)) for run, v in columns)] for label in labels),
+        ["eigenfunctions, as above", *(score_text(_figures(run, HEADLINE, None, v, seed)) for run, v in columns)],
+        *([label, *(score_text(_figures(run, block, label, v, seed)) for run, v in columns)] for label in labels),
     ]
     titles = {
         GRIP: "Sensitivity to the grip of the road, RMSE in %, mean ± std (median)",
-        BASELINES: "What fits nothing, and what is fitted to the very same trajectories, RMSE in %",
+        BASELINES: "Baselines without any fit, and EDMD of the very same trajectories, RMSE in %, mean ± std (median)",
     }
     return Table(titles[block], ["", *(_column(run, vehicle) for run, vehicle in columns)], rows)
 
@@ -172,7 +178,7 @@ def notes(runs: Sequence[Run]) -> list[str]:
     """What the tables mean, beginning with a word on runs of another size than the paper's."""
     mean, std = EIGEN_RMSE
     said = [
-        "The lattice's exponentials are nearly dependent, so the smallest singular value kept decides the figure; the "
+        "The lattice's exponentials are nearly dependent, so the smallest singular value kept decides the error; the "
         "same holds for the paper's own.",
         "A looked-up state is followed to the end of its trajectory, so the data must reach past the table by the "
         "horizon: with 1 s simulated and tabulated, predictions would leave the fitted window, where exponentials of "
@@ -184,7 +190,7 @@ def notes(runs: Sequence[Run]) -> list[str]:
             0,
             f"The paper's {mean:g} ± {std:g} % is met on the later tyre of its authors ({DEFAULT_VEHICLE}), whose peak "
             "they doubled, with a tyre, a number of centres and a cut that were chosen knowing the answer: the paper "
-            "states none of them, and the tables show how far each moves the figure.",
+            "states none of them, and the tables show how far each moves the error.",
         )
     full = all((count_text(surface(r.experiment).count), _tests(ball(r.experiment))) == SIZES for r in runs)
     return said if full else [REDUCED, *said]
@@ -201,10 +207,6 @@ def _as_in_the_paper(experiment: Experiment) -> bool:
         and replace(test, seed=BallSample.seed) == BallSample(m=m, Jzz=Jzz)
         and experiment.simulate == Simulate(vehicle=experiment.vehicle)
     )
-
-
-def _score(figures: Meta | None, unit: str = "") -> str:
-    return score_text(figures, unit, digits=4)
 
 
 def _beaten(run: Run, vehicle: str) -> str | None:
@@ -270,6 +272,7 @@ METHOD = Method(
     tables=tables,
     notes=notes,
     pictures=pictures,
+    lead=headlines.EIGEN,
     fixed={
         "test.seed": "reproduce.seeds=[4,5]",
         "test.ball.seed": "reproduce.seeds=[4,5]",

@@ -10,7 +10,7 @@ from koopcli.config.changes import flat, parse_set
 from koopcli.errors import InvalidValueError, UsageError
 from koopcli.figures.drawing import Drawing
 from koopcli.figures.registry import FIGURES, FigureKind
-from koopcli.reproduction.report import Method, Picture, Run
+from koopcli.reproduction.report import Picture, Plan, Run
 from koopcli.stages import drawn
 from koopcli.stages.base import Task
 from koopcli.stages.effects import why_idle
@@ -23,7 +23,7 @@ from koopcli.store import Record
 class Illustration:
     """A picture of a report: its ``drawing`` with its ``record`` and those of what it ``draws``, or why there is none.
 
-    ``command`` makes it.
+    ``command`` makes it; one that ``leads`` may open the report.
     """
 
     figure: str
@@ -34,19 +34,20 @@ class Illustration:
     record: Record | None
     draws: tuple[Record, ...]
     reason: str = ""
+    leads: bool = False
 
 
-def illustrate(method: Method, runs: Sequence[Run], pipeline: Pipeline) -> list[Illustration]:
-    """Make or find every picture of a method; one that two runs share is shown once.
+def illustrate(plans: Sequence[Plan], pipeline: Pipeline) -> list[Illustration]:
+    """Make or find every picture of the plans of a method; one that two runs share is shown once.
 
     What cannot be drawn, as an evaluation where every prediction diverged, is left out with the reason.
     """
     found = []
     wanted: dict[Task, tuple[Run, Picture]] = {}
-    for run in runs:
-        for picture in method.pictures(run.experiment):
-            wanted.setdefault(picture.task, (run, picture))
-    with pipeline.reporter.progress(f"figures of {method.name}") as progress:
+    for plan in plans:
+        for picture in plan.pictures:
+            wanted.setdefault(picture.task, (plan.run, picture))
+    with pipeline.reporter.progress(f"figures of {plans[0].method.name}") as progress:
         for i, (run, picture) in enumerate(wanted.values()):
             progress(i, len(wanted))
             found.append(_illustration(run, picture, pipeline))
@@ -58,15 +59,14 @@ def _illustration(run: Run, picture: Picture, pipeline: Pipeline) -> Illustratio
     try:
         made = pipeline.make(picture.task)
     except InvalidValueError as error:
-        return Illustration(name, picture.caption, run.label, "", None, None, (), str(error))
+        return Illustration(name, picture.caption, run.label, "", None, None, (), str(error), picture.leads)
     main = FIGURES[name].roles[:1]  # the artefact itself comes first
     inputs = {tuple(key.split("/")): one for key, one in made.record.lineage.items()}
     names = [one for (_, role), one in sorted(inputs.items(), key=lambda item: int(item[0][0])) if (role,) == main]
     found = (pipeline.store.record(*one.split("/")) for one in names)
     draws = tuple(one for one in found if one is not None)
-    return Illustration(
-        name, picture.caption, run.label, command(run, picture, draws), made.content, made.record, draws
-    )
+    making = command(run, picture, draws)
+    return Illustration(name, picture.caption, run.label, making, made.content, made.record, draws, leads=picture.leads)
 
 
 def command(run: Run, picture: Picture, draws: Sequence[Record]) -> str:

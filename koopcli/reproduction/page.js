@@ -1,26 +1,56 @@
-// Each view stands beside a picture of the same, which stays where views cannot be drawn and comes back in print.
-const NARROW = 600; // pixels
+// Everything can be read without a script: this adds buttons that copy, pictures that enlarge, and tables that are open
+// in print where the style sheet cannot open them.
 (() => {
-  const canvas = document.createElement("canvas");
-  if (!window.Plotly || !(canvas.getContext("webgl2") || canvas.getContext("webgl"))) return;
-  for (const view of document.querySelectorAll(".view")) {
-    const { data, layout } = JSON.parse(document.getElementById(`${view.id}-data`).textContent);
-    const figure = view.closest("figure");
-    figure.classList.add("turnable"); // shown first: what is hidden has no size to be drawn in
-    if (view.clientWidth < NARROW) { // the bar goes below, the eye further away
-      const { colorbar } = data[data.length - 1].marker;
-      Object.assign(colorbar, { orientation: "h", len: 0.9, y: -0.02, yanchor: "top" });
-      colorbar.title.side = "bottom";
-      const { eye } = layout.scene.camera;
-      for (const axis of ["x", "y", "z"]) eye[axis] *= 1.45;
-      layout.legend.y = -0.3;
+  const copy = async code => {
+    try {
+      await navigator.clipboard.writeText(code.textContent);
+    } catch { // an old browser, or a page that is no secure one
+      getSelection().selectAllChildren(code);
+      document.execCommand("copy");
     }
-    Plotly.newPlot(view, data, layout, {
-      responsive: true,
-      displaylogo: false,
-      plotlyServerURL: "", // nothing here leaves the page
-      modeBarButtons: [["zoom3d", "pan3d", "orbitRotation", "resetCameraDefault3d", "toImage"]],
-    })
-      .catch(() => figure.classList.remove("turnable"));
+  };
+  for (const line of document.querySelectorAll(".command")) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = "Copy";
+    button.onclick = async () => {
+      await copy(line.querySelector("code"));
+      button.textContent = "Copied";
+      setTimeout(() => { button.textContent = "Copy"; }, 1500);
+    };
+    line.append(button);
   }
+
+  const dialog = document.createElement("dialog");
+  dialog.setAttribute("aria-label", "figure, enlarged");
+  dialog.onclick = () => dialog.close();
+  document.body.append(dialog);
+  for (const image of document.querySelectorAll("figure img")) {
+    image.tabIndex = 0;
+    image.setAttribute("role", "button");
+    image.title = "Enlarge";
+    image.onclick = () => {
+      const large = image.cloneNode();
+      large.removeAttribute("title");
+      large.removeAttribute("tabindex");
+      dialog.replaceChildren(large);
+      dialog.showModal();
+    };
+    image.onkeydown = event => {
+      if (event.key !== "Enter" && event.key !== " ") return;
+      event.preventDefault();
+      image.onclick();
+    };
+  }
+
+  const opened = [];
+  addEventListener("beforeprint", () => {
+    for (const one of document.querySelectorAll(".folded:not([open])")) {
+      one.open = true;
+      opened.push(one);
+    }
+  });
+  addEventListener("afterprint", () => {
+    for (const one of opened.splice(0)) one.open = false;
+  });
 })();

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from koopcli.config.experiment import Experiment
+from koopcli.config.pictures import FigureName, ImageFormat
 from koopcli.config.plants import UNUSED
 from koopcli.records import Meta
+from koopcli.stages import drawn
 from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline
 from koopcli.store import Record
 
-REDUCED = "This run is not of the paper's size: its figures cannot be put beside the paper's."
+REDUCED = "This run is not of the paper's size: its numbers cannot be put beside the paper's."
+RASTERS: frozenset[FigureName] = frozenset({"error-map", "error-side", "energy-surface", "density", "spectrum"})
+# figures of thousands of marks, which are smaller as PNG at the paper's size; all others are smaller as SVG
+SMALLEST, LARGEST = 5, 6  # powers of ten between which numbers are written without one
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts: figures that stand in columns, the first ``left`` of which are names, or ``words`` of
+    """A table of texts: numbers that stand in columns, the first ``left`` of which are names, or ``words`` of
     several lines that are read across.
     """
 
@@ -31,7 +37,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Scored:
-    """A cell of a method with the figures of its evaluation and the record that holds them."""
+    """A cell of a method with the numbers of its evaluation and the record that holds them."""
 
     cell: Any
     figures: Meta
@@ -56,10 +62,43 @@ class Run:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure of the report: its task and what stands under it."""
+    """A figure of the report: its task and what stands under it. One that ``leads`` may open the report."""
 
     task: Task
     caption: str
+    leads: bool = False
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of the first screen: what the ``paper`` says of it, and each run."""
+
+    label: str
+    paper: str
+    here: Sequence[str]
+    unit: str = "%"
+
+
+@dataclass(frozen=True)
+class Race:
+    """Predictors, each under its label, that are shown beside the true car under one set of inputs.
+
+    ``evaluation``: the first one's, whose test trajectory of mean error is shown; without it the car swerves.
+    """
+
+    ghosts: tuple[tuple[str, Task], ...]
+    evaluation: Task | None = None
+
+
+@dataclass(frozen=True)
+class Lead:
+    """What a method has to say on the first screen: its ``numbers``, the most telling first, a ``clause`` of the one
+    sentence, and the ``race`` of its predictors.
+    """
+
+    numbers: Callable[[Sequence[Run]], list[Number]]
+    clause: Callable[[Run], str]
+    race: Callable[[Experiment], Race]
 
 
 @dataclass(frozen=True)
@@ -76,6 +115,8 @@ class Method:
     """What the tables mean."""
     pictures: Callable[[Experiment], list[Picture]]
     """The figures of an experiment."""
+    lead: Lead
+    """What of it stands on the first screen."""
     fixed: Mapping[str, str]
     """Settings that the method sweeps over or fixes, and what to write instead."""
     uses: Callable[[str], bool]
@@ -86,23 +127,36 @@ class Method:
     """Settings of fits that some of its cells have a use for, whatever the experiment's own fit has."""
 
 
-def tasks(method: Method, run: Run) -> list[Task]:
-    """Everything a run makes: the evaluation of every cell, then the pictures."""
-    pictures = method.pictures(run.experiment)
-    return [*(task for _, task in method.cells(run.experiment)), *(picture.task for picture in pictures)]
+@dataclass(frozen=True)
+class Plan:
+    """What a run consists of: its cells, each with its evaluation, and its pictures."""
+
+    method: Method
+    run: Run
+    cells: Sequence[tuple[Any, Task]]
+    pictures: Sequence[Picture]
+
+    @property
+    def tasks(self) -> list[Task]:
+        """Everything that is made: the evaluation of every cell, then the pictures."""
+        return [*(task for _, task in self.cells), *(picture.task for picture in self.pictures)]
 
 
-def run_cells(method: Method, run: Run, pipeline: Pipeline) -> Run:
-    """Make or find every cell of a run that has none yet, with a progress display."""
-    scored = []
-    cells = list(method.cells(run.experiment))
-    with pipeline.reporter.progress(f"reproduce {method.name}, {run.label}") as progress:
-        for i, (cell, task) in enumerate(cells):
-            progress(i, len(cells))
+def planned(method: Method, run: Run) -> Plan:
+    """The plan of a run, which takes a while to say."""
+    return Plan(method, run, list(method.cells(run.experiment)), method.pictures(run.experiment))
+
+
+def run_cells(plan: Plan, pipeline: Pipeline) -> Run:
+    """Make or find every cell of a plan, with a progress display: the run with its scores."""
+    method, scored = plan.method, []
+    with pipeline.reporter.progress(f"reproduce {method.name}, {plan.run.label}") as progress:
+        for i, (cell, task) in enumerate(plan.cells):
+            progress(i, len(plan.cells))
             artefact = pipeline.make(task)
             measured = method.measure(pipeline, cell, task) if method.measure is not None else {}
             scored.append(Scored(cell, artefact.figures, artefact.record, measured))
-    return replace(run, scored=tuple(scored))
+    return replace(plan.run, scored=tuple(scored))
 
 
 def has_effect(name: str, *, plant: str, swept: Sequence[str], foreign: Sequence[str]) -> bool:
@@ -117,29 +171,66 @@ def has_effect(name: str, *, plant: str, swept: Sequence[str], foreign: Sequence
 
 
 def full_table(method: Method, runs: Sequence[Run]) -> Table:
-    """Every figure of every cell."""
+    """Every number of every cell."""
     about = list(vars(runs[0].scored[0].cell))
-    header = ["run", *about, "mean", "std", "median", "max", "start", "relift mean", "printed mean"]
+    header = ["run", *about, "mean", "std", "median", "max", "start", "re-lifted", "as printed"]
     header += ["max yaw error (rad/s)", "worst in emptiest", "diverged", "artefact"]
     rows = []
     for run in runs:
         for scored in run.scored:
             figures = scored.figures
-            numbers = [figures["rmse"][statistic] for statistic in ("mean", "std", "median", "max")]
-            numbers += [figures[name]["mean"] for name in ("start_error", "rmse_relift", "rmse_printed")]
-            numbers += [figures["max_error"]["yaw_rate"], figures["worst_in_emptiest"]]
-            text = [f"{number:.4g}" for number in numbers]
-            cell = [str(value) for value in vars(scored.cell).values()]
-            rows.append([run.label, *cell, *text, str(figures["diverged"]), scored.record.name])
-    return Table(f"Every evaluation of {method.title}, RMSE in %", header, rows)
+            numbers = [statistic_text(figures, name) for name in ("mean", "std", "median", "max")]
+            others = [figures[name]["mean"] for name in ("start_error", "rmse_relift", "rmse_printed")]
+            others += [figures["max_error"]["yaw_rate"], figures["worst_in_emptiest"]]
+            cell = ["" if value is None else str(value) for value in vars(scored.cell).values()]
+            rows.append(
+                [run.label, *cell, *numbers, *map(number_text, others), str(figures["diverged"]), scored.record.name]
+            )
+    title = f"Every evaluation of {method.title}, RMSE in %"
+    return Table(title, header, rows, left=1 + len(about))
 
 
-def score_text(figures: Meta | None, unit: str = "", digits: int = 3) -> str:
-    """``mean ± std (median)`` of the RMSE to ``digits``, the deviation to one less."""
+def number_text(value: float, digits: int = 3) -> str:
+    """A number with ``digits`` significant ones, written as people write it: 3.30, 1230, 1.0e-12."""
+    if not math.isfinite(value):
+        return "–"
+    if value == 0:
+        return "0"
+    exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])
+    if not -SMALLEST <= exponent < LARGEST:
+        return f"{value:.{digits - 1}e}"
+    decimals = digits - 1 - exponent
+    return f"{round(value, decimals):.{max(0, decimals)}f}"
+
+
+def statistic_text(figures: Meta, name: str) -> str:
+    """A statistic of the RMSE: the deviation with two significant digits, any other with three."""
+    return number_text(figures["rmse"][name], 2 if name == "std" else 3)
+
+
+def mean_text(figures: Meta | None) -> str:
+    """``mean ± std`` of the RMSE, or that it diverges."""
     if figures is None:
         return "–"
-    rmse = figures["rmse"]
-    return f"{rmse['mean']:.{digits}g} ± {rmse['std']:.{digits - 1}g} ({rmse['median']:.{digits}g}){unit}"
+    if not math.isfinite(figures["rmse"]["mean"]):
+        return "diverges"
+    return f"{statistic_text(figures, 'mean')} ± {statistic_text(figures, 'std')}"
+
+
+def score_text(figures: Meta | None) -> str:
+    """``mean ± std (median)`` of the RMSE, or that it diverges."""
+    text = mean_text(figures)
+    return text if figures is None or "±" not in text else f"{text} ({statistic_text(figures, 'median')})"
+
+
+def drawer(experiment: Experiment) -> Callable[..., Task]:
+    """``(figure, artefacts, labels=…)`` -> its task for the report of an experiment, in the format that is smaller."""
+
+    def draw(figure: FigureName, artefacts: Sequence[Task], labels: Mapping[Task, str] | None = None) -> Task:
+        image: ImageFormat = "png" if figure in RASTERS else "svg"
+        return drawn.figure(figure, artefacts, image, experiment, labels=labels)
+
+    return draw
 
 
 def count_text(*numbers: int) -> str:

@@ -24,7 +24,7 @@ class Page(HTMLParser):
         self.loaded += [about[name] for name in ("src", "href") if name in about]
         if tag == "script":
             self.scripts += 1
-        if tag == "h4":
+        if tag == "summary":
             self._caption = ""
         if tag == "table":
             self._rows = []
@@ -36,6 +36,8 @@ class Page(HTMLParser):
             self.figures.append({"figure": about["data-figure"], "text": "", "command": "", "alt": ""})
         elif tag == "img":
             self.figures[-1]["alt"] = about["alt"]
+        if tag == "br" and "td" in self._inside:
+            self._rows[-1][-1] += "\n"
         if tag not in ("meta", "link", "img", "br"):
             self._inside.append(tag)
 
@@ -45,9 +47,9 @@ class Page(HTMLParser):
             self.tables.setdefault(self._caption, []).extend(self._rows)
 
     def handle_data(self, data):
-        if "h4" in self._inside:
+        if "summary" in self._inside:
             self._caption += data
-        elif self._inside[-1:] in (["td"], ["th"]):
+        elif {"td", "th"} & set(self._inside):
             self._rows[-1][-1] += data
         if "figure" in self._inside and "script" not in self._inside:
             self.figures[-1]["command" if "code" in self._inside else "text"] += data
