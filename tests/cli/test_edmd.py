@@ -114,12 +114,13 @@ def test_the_verdict_is_plain(koop):
 
 def test_scores_on_what_was_fitted_are_called_so(koop):
     """Each time, whether they are made or found."""
-    data = koop("simulate").name
+    few = ("--set", "sample.count=3", "--set", "sample.levels=[100]", "--set", "evaluate.chunk=100")
+    data = koop("simulate", *few[:4]).name
     for _ in range(2):
-        done = koop("evaluate", "--on", data[:14], "--json")
+        done = koop("evaluate", *few, "--on", data[:14], "--json")
         assert "warning: the predictor was fitted to these test trajectories" in done.err
         assert json.loads(done.out)["fitted_to_test_data"] is True
-    usual = koop("evaluate", "--json")
+    usual = koop("evaluate", *few, "--json")
     assert "was fitted to these" not in usual.err
     assert json.loads(usual.out)["fitted_to_test_data"] is False
 
