@@ -58,7 +58,7 @@ def plot(
     check_outputs(output, csv_, as_json=as_json)
     call = begin(store, experiment, set_, SECTIONS)
     from koopcli.figures.registry import FIGURES
-    from koopcli.stages import drawn
+    from koopcli.stages import drawn, recipes
 
     kind, made = FIGURES[figure], drawn.MADE[FIGURES[figure].made]
     if artefacts and kind.takes == "nothing":
@@ -68,7 +68,7 @@ def plot(
         sources = [call.named(one, drawn.TAKES[kind.takes], f"what '{figure}' draws", told) for one in artefacts]
     else:
         for name, _ in flat(call.changes):
-            if f"{name}.".startswith(made.fixed):
+            if made.chooses(name, call.experiment):
                 raise UsageError(f"--set {name} changes nothing in the figure '{figure}': {made.instead}")
         sources = made.tasks(call.experiment)
     labels = _labels(label, sources, kind)
@@ -79,10 +79,9 @@ def plot(
             call.console.note("add -o FILE.png, .svg or .pdf to write the image, --csv FILE for its numbers")
 
     task = drawn.figure(figure, sources, image, call.experiment, call.simulated, labels)
-    told_by = [f"plot.{name}" for name in kind.told]
-    call.run(
-        task, as_json=as_json, dry_run=dry_run, extra=export, reads=(*made.reads, *told_by), table_out=csv_ == STDOUT
-    )
+    reads = [*made.reads, *(f"plot.{name}" for name in kind.told)]
+    reads += recipes.CHOSEN if made.fit is not None and not artefacts else ()
+    call.run(task, as_json=as_json, dry_run=dry_run, extra=export, reads=reads, table_out=csv_ == STDOUT)
 
 
 def _labels(given: list[str] | None, sources: list[Task], kind: FigureKind) -> dict[Task, str] | None:

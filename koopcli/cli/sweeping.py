@@ -41,8 +41,12 @@ ROWS = 40  # of the table on the screen
 
 def sweep(
     method: Annotated[
-        MethodName, typer.Argument(metavar="fit-edmd|fit-eigen|baseline", help="What makes the predictors.")
-    ] = "fit-edmd",
+        MethodName | None,
+        typer.Argument(
+            metavar="fit-edmd|fit-eigen|baseline",
+            help="What makes the predictors (the fit that the experiment is about, else fit-edmd).",
+        ),
+    ] = None,
     set_: Annotated[
         list[str] | None,
         typer.Option(

@@ -161,6 +161,7 @@ def _check(task: Task) -> None:
         raise InvalidValueError("the terms 'generator' need a constant, which the basis 'states' has not: use 'total'")
     data = [task.input(role) for role in roles_of(dict(task.inputs))]
     _check_alike(data)
+    _check_samples(task, data)
     sample = task.find("sample")
     if sample is not None and isinstance(sample.settings, GridSample) and len(data) == 1:
         _check_grid(task, sample.settings)
@@ -179,6 +180,16 @@ def _check_alike(data: list[Task]) -> None:
     for i, one in enumerate(data):
         if one in data[:i]:
             raise InvalidValueError(f"{one.name} is named twice: its samples would count double, so name it once")
+
+
+def _check_samples(task: Task, data: list[Task]) -> None:
+    """Refuse fewer samples than unknowns, as far as it is known how many there will be."""
+    starts = [one.find("sample") for one in data]
+    if all(start is not None for start in starts):
+        runs = zip(starts, data, strict=True)
+        samples = sum(start.settings.trajectories * one.settings.steps for start, one in runs if start is not None)
+        inputs = len(PLANTS[_plant(task)].inputs)
+        edmd.check_samples(samples, _functions(task), inputs, bilinear=task.settings.terms != "linear")
 
 
 def _check_grid(task: Task, grid: GridSample) -> None:
