@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from koopcli.cli.invocation import Invocation
-from koopcli.config.changes import parse_set
-from koopcli.config.experiment import Experiment, load_experiment
+from koopcli.config.changes import Changes, parse_set
+from koopcli.config.experiment import load_experiment
 from koopcli.config.grids import text_of
 from koopcli.errors import KoopError
 
@@ -37,14 +37,16 @@ def advice(typed: Typed, call: Invocation, evaluation: Task, figures: Meta) -> s
         return (
             f"{found.why}. Try: {_line(['koop', 'evaluate', *typed.only('predictor'), *typed.but('predictor', 'on')])}"
         )
+    if not found.page:
+        return f"{found.why}."
     if found.better is None:
         return f"{found.why}; no setting of koop is known to beat the baseline here: see {found.page}"
     command = _short(typed, call, evaluation, found.better) or _nested(typed, call, evaluation, found.better)
     if command is None:
         return f"{found.why}: see {found.page} for what does better"
     gain = found.better.gain
-    measured = f"measured on {gain.vehicle}: {gain.before:.3g} % became {gain.after:.3g} %"
-    return f"{found.why}; {measured}. Try: {command}"
+    measured = f"measured on {gain.vehicle} to turn {gain.before:.3g} % into {gain.after:.3g} %"
+    return f"{found.why}. Try this, {measured}: {command}"
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,8 @@ def _short(typed: Typed, call: Invocation, evaluation: Task, better: Better) -> 
     sets |= {f"sample.{name}": text_of(value) for name, value in better.sample.items()}
     sets |= {f"{better.fit}.{name}": text_of(value) for name, value in better.changes.items()}
     try:
-        experiment = _experiment(better.experiment, sets)
+        tested = {section: values for section, values in call.changes.items() if section in TEST}  # by options too
+        experiment = load_experiment(better.experiment, {**_changes(sets), **tested})
         fit = recipes.predictor(experiment)
         test = evaluation.input("trajectories") if "on" in typed.words else None
         task = recipes.evaluation(experiment, fit, test)
@@ -126,8 +129,7 @@ def _nested(typed: Typed, call: Invocation, evaluation: Task, better: Better) ->
     if better.data == "same":
         records = [call.pipeline.found(task) for task in data]
         names = [record.name for record in records if record is not None]
-        experiment = _experiment(better.experiment, changes)
-        fit = recipes.fit_edmd(experiment, *data)
+        fit = recipes.fit_edmd(load_experiment(better.experiment, _changes(changes)), *data)
         if len(names) < len(data):
             return None
     else:
@@ -137,7 +139,7 @@ def _nested(typed: Typed, call: Invocation, evaluation: Task, better: Better) ->
             return None
         kept = sample_words(sample, better.keeps) | {f"sample.{k}": text_of(v) for k, v in better.sample.items()}
         changes = {**vehicle, **plant_words(simulation), **kept, **changes}
-        fit = recipes.METHODS[better.fit](_experiment(better.experiment, changes))
+        fit = recipes.METHODS[better.fit](load_experiment(better.experiment, _changes(changes)))
     if not _does(fit, call, evaluation, better):
         return None
     inner = _line(["koop", better.fit, *names, *_options(better.experiment, changes), *typed.only("store")])
@@ -175,8 +177,8 @@ def _does(fit: Task, call: Invocation, evaluation: Task, better: Better) -> bool
     return True
 
 
-def _experiment(name: str, sets: Mapping[str, str]) -> Experiment:
-    return load_experiment(name, parse_set([f"{key}={value}" for key, value in sets.items()]))
+def _changes(sets: Mapping[str, str]) -> Changes:
+    return parse_set([f"{name}={value}" for name, value in sets.items()])
 
 
 def _options(experiment: str, sets: Mapping[str, str]) -> list[str]:

@@ -135,7 +135,9 @@ def _judge(call: Invocation, typed: Typed, task: Task, artefact: Artefact, other
             "predicts: test it on others, such as those of another seed"
         )
     if not others:
-        call.console.note("no baselines beside it: the data that this predictor was fitted to are no longer there")
+        call.console.note(
+            "there are no baselines: the data that this predictor was fitted to are no longer in the store"
+        )
         return about
     quiet = Pipeline(call.pipeline.store, _Unwarned(call.console), call.pipeline.workers)
     names, figures = {}, {}
@@ -168,7 +170,7 @@ def _scores(figures: dict[str, Any]) -> list[str]:
 
 
 class _Unwarned:
-    """A console that keeps to itself what is wrong with a baseline, which is meant to be poor."""
+    """A console that shows no warnings: a baseline is meant to be poor."""
 
     def __init__(self, console: Console) -> None:
         self._console = console

@@ -24,17 +24,17 @@ if TYPE_CHECKING:
 
 def plot(
     figure: Annotated[
-        str | None, typer.Argument(autocompletion=complete_figure, help="Name of the figure; --list shows them.")
+        str | None, typer.Argument(autocompletion=complete_figure, help="Name of the figure; --list shows them all.")
     ] = None,
     artefacts: Annotated[
         list[str] | None,
-        typer.Argument(autocompletion=complete_name, metavar="ARTEFACT", help="What to draw; made when left out."),
+        typer.Argument(autocompletion=complete_name, metavar="ARTEFACT", help="Artefacts to draw; made when left out."),
     ] = None,
     output: OutputOption = None,
     csv_: CsvOption = None,
     label: Annotated[
         list[str] | None,
-        typer.Option(metavar="TEXT", help="What an artefact is called beside others: one for each, in their order."),
+        typer.Option(metavar="TEXT", help="Label of an artefact beside others: one for each, in their order."),
     ] = None,
     list_: Annotated[bool, typer.Option("--list", help="List the figures.")] = False,
     set_: SetOption = None,
@@ -43,7 +43,9 @@ def plot(
     dry_run: DryRunOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Draw a figure from artefacts, making them when they are not named.
+    """Draw a figure of artefacts, making them when they are not named.
+
+    A figure that can be drawn for either fit makes the one that the experiment is about.
 
     Example: koop plot error-map -o errors.pdf
     """

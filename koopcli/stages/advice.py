@@ -66,12 +66,14 @@ class Better:
 
 @dataclass(frozen=True)
 class Advice:
-    """Why a predictor does not beat its baselines, and what does: ``better``, or the test set of its own vehicle."""
+    """Why a predictor does not beat its baselines, and what to do."""
 
     why: str
-    page: str
+    page: str = ""
+    """Where more is said; nothing where the reason says what to do."""
     better: Better | None = None
     own_test: bool = False
+    """Whether to test it on its own vehicle."""
 
 
 def case_of(evaluation: Task, figures: Meta) -> Case | None:
@@ -96,19 +98,15 @@ def case_of(evaluation: Task, figures: Meta) -> Case | None:
 
 def advise(case: Case) -> Advice:
     """The advice on a predictor that does not beat its baselines."""
-    page = PAGES[case.plant]
     if case.elsewhere:
-        why = "the test trajectories are of another vehicle or plant than the predictor"
-        return Advice(why, page, own_test=True)
-    better = RULES[case.plant](case)
-    return Advice(next(text for holds, text in REASONS if holds(case)), page, better)
+        return Advice("the test trajectories are of another vehicle or plant than the predictor", own_test=True)
+    if case.edmd and case.tested and not case.trained:
+        return Advice("no input moves in the training data, so the predictor knows nothing of inputs: sample some")
+    why = next(text for holds, text in REASONS if holds(case))
+    return Advice(why, PAGES[case.plant], RULES[case.plant](case))
 
 
 REASONS: tuple[tuple[Callable[[Case], bool], str], ...] = (
-    (
-        lambda case: case.edmd and case.tested and not case.trained,
-        "no input moves in the training data, so the predictor knows nothing of inputs: sample some that do",
-    ),
     (
         lambda case: case.edmd and case.diverged and case.fit.basis != "states",
         "outside the data the fitted functions grow without bound",
@@ -139,7 +137,7 @@ REASONS: tuple[tuple[Callable[[Case], bool], str], ...] = (
 
 def _forces(case: Case) -> Better | None:
     """Bilinear terms where inputs act; else more powers, on points that cover the box."""
-    if not case.edmd or (case.tested and not case.trained):
+    if not case.edmd:
         return None
     grid = case.sample if isinstance(case.sample, GridSample) else None
     if case.tested:
@@ -172,7 +170,7 @@ def _slips(case: Case) -> Better | None:
 
 def _wheels(case: Case) -> Better | None:
     """Bilinear terms of few functions."""
-    if not case.edmd or case.fit.terms != "linear" or not (case.tested and case.trained):
+    if not case.edmd or case.fit.terms != "linear" or not case.tested:
         return None
     return Better("fit-edmd", "same", WHEELS, changes=FEW)
 

@@ -20,9 +20,9 @@ from koopcli.koopman.survey import Survey, survey
 from koopcli.koopman.thin_plate import ThinPlate
 from koopcli.koopman.transitions import Transitions
 from koopcli.progress import Progress
-from koopcli.records import Packed
-from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task
-from koopcli.stages.predictors import describe, figures
+from koopcli.records import Meta, Packed
+from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task
+from koopcli.stages.predictors import figures, regression, size
 from koopcli.stages.usable import finished, roles_of
 from koopcli.store.files import size_text
 from koopcli.vehicles.plants import PLANTS
@@ -114,7 +114,7 @@ def _plant(task: Task) -> str:
     return simulation.settings.plant if simulation is not None else "forces"
 
 
-def _prospect(task: Task) -> Prospect:
+def _outlook(task: Task) -> Outlook:
     settings, sample = task.settings, task.find("sample")
     about = "other data"
     if sample is not None:
@@ -125,7 +125,7 @@ def _prospect(task: Task) -> Prospect:
         name = f"bilinear {name}" if settings.terms == "bilinear" else f"bilinear {name}, generator"
     order = settings.order if "order" in OF_BASIS[settings.basis] else None
     rolling = 2.5e-10 * _functions(task) * _terms(task) * ROLLED[settings.terms]
-    return Prospect(_functions(task), None, name, about, order, a_state=rolling)
+    return Outlook(_functions(task), None, name, about, order, a_state=rolling)
 
 
 NAMES = {
@@ -220,6 +220,11 @@ def _estimate(task: Task) -> Cost:
     return Cost(lifting + 5e-11 * rows * N * terms + 1.5e-9 * N**3, 8.0 * N * terms)
 
 
+def _describe(figures: Meta, settings: FitEdmd) -> str:
+    found = f"{size(figures)}; {regression(figures)}, condition {figures['condition']:.2g}"
+    return f"{found}, solved by {figures['solved_by']}" if figures["solved_by"] else found
+
+
 STAGE = Stage(
     name="fit-edmd",
     version=4,
@@ -227,9 +232,9 @@ STAGE = Stage(
     run=_run,
     unpack=Predictor.unpack,
     figures=figures,
-    describe=describe,
+    describe=_describe,
     check=_check,
     estimate=_estimate,
     chunk=_chunk,
-    predicts=_prospect,
+    predicts=_outlook,
 )
