@@ -9,15 +9,24 @@ import typer
 import koopcli
 from koopcli.cli import command, comparing, keeping, looking, making, plotting, reproduce, sweeping, vehicles
 
+FIRST = (
+    ("koop reproduce", "the paper's results"),
+    ("koop evaluate --experiment best-edmd", "a good predictor"),
+    ("koop evaluate --experiment best-edmd --vehicle bmw-320i", "another vehicle"),
+    ("koop sweep --set fit-edmd.order=1:8", "many predictors"),
+    ("koop ls", "what there is"),
+)  # what to type first, and what it gives
+LINES = "\n".join(f"{command:<57}{gives}" for command, gives in FIRST)
+
 app = typer.Typer(
     name="koop",
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
-    help="Identify Koopman predictors of vehicle dynamics.\n\nEvery command makes or reads artefacts in a store; "
-    "a command named alone makes what it needs and reuses what is there. Defaults stand in parentheses; they are "
-    "the paper's, and an --experiment file or --set changes any of them.\n\n"
-    "Example: koop fit-edmd --order 7 && koop evaluate",
+    help=f"Identify Koopman predictors of vehicle dynamics. To begin with:\n\n\b\n{LINES}\n\n"
+    "Your own vehicle is a file, --vehicle ./my-car.toml. Run any command by itself: it makes whatever is missing, "
+    "keeps everything in a store and reuses it. Defaults stand in parentheses. They are the paper's; an --experiment "
+    "file or --set changes any of them.",
 )
 reproduce.register(app)
 making.register(app)

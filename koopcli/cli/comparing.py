@@ -28,9 +28,7 @@ def diff(
     one: Annotated[
         str, typer.Argument(metavar="A", autocompletion=complete_name, help="An artefact by name, or an HDF5 file.")
     ],
-    other: Annotated[
-        str, typer.Argument(metavar="B", autocompletion=complete_name, help="What it is compared with, likewise.")
-    ],
+    other: Annotated[str, typer.Argument(metavar="B", autocompletion=complete_name, help="The other one, likewise.")],
     rtol: Annotated[
         float,
         typer.Option(metavar="R", help=f"Values are equal where |a − b| ≤ R · max(|a|, |b|) ({RTOL:g})."),
@@ -40,7 +38,7 @@ def diff(
 ) -> None:
     """Compare two artefacts: every setting behind them, their arrays, and the small facts beside those.
 
-    Ends with code 0 whether they are equal or not; the last line says it, and "equal" in --json.
+    The exit code is 0 whether they are equal or not; the last line says which, and "equal" in --json.
 
     Example: koop diff fit-edmd/3f2a fit-edmd/91bc --rtol 1e-6
     """
@@ -142,7 +140,7 @@ def _show(name_a: str, name_b: str, settings: Pairs, found: Comparison) -> None:
         ]
         for array in found.arrays
     ]
-    show_table(["array", "shape", "A | B", "largest", "relative", "beyond"], rows, left=3)
+    show_table(["array", "shape", "A | B", "largest |a − b|", "relative", "values beyond R"], rows, left=3)
 
 
 def _what(found: Comparison) -> str:

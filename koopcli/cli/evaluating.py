@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from koopcli.cli import fitting
+from koopcli.cli.advising import TEST, Typed, advice
 from koopcli.cli.completion import complete_name
 from koopcli.cli.invocation import Invocation, begin
 from koopcli.cli.options import (
@@ -18,6 +19,7 @@ from koopcli.cli.options import (
     JsonOption,
     SetOption,
     StoreOption,
+    VehicleOption,
     WorkersOption,
     names,
 )
@@ -31,14 +33,17 @@ if TYPE_CHECKING:
     from koopcli.stages.base import Task
     from koopcli.stages.pipeline import Artefact
 
-
-TEST = ("test", "evaluate")
+FITS = ("experiment", "fit-edmd", "fit-eigen")  # the sections that choose and make a predictor
 
 
 def evaluate(
+    context: typer.Context,
     predictor: Annotated[
         str | None,
-        typer.Argument(autocompletion=complete_name, help="A predictor; fit-edmd makes one when left out."),
+        typer.Argument(
+            autocompletion=complete_name,
+            help="A predictor; made when left out, by the fit that the experiment is about or else fit-edmd.",
+        ),
     ] = None,
     on: Annotated[
         str | None,
@@ -75,6 +80,7 @@ def evaluate(
             "predictor driven by forces the test set is then the paper's trajectory under random inputs (kind point)."
         ),
     ] = None,
+    vehicle: VehicleOption = None,
     workers: WorkersOption = 1,
     cluster: ClusterOption = None,
     set_: SetOption = None,
@@ -87,14 +93,15 @@ def evaluate(
 
     The plant names the test set: a box of states with inputs for forces, the states inside Γ without inputs for slips,
     cars under way with torques and steer for wheels.
-    An interrupted evaluation goes on where it stopped. Beside it stand what fits nothing, the first state held and the
-    plant linearised there, and the linear predictor of the same data, with a verdict.
+    An interrupted evaluation goes on where it stopped. The predictor is compared with three baselines: the first state
+    held, the plant linearised there, and a linear model of the same data. Where one of them is better, the last line
+    says why and what to type.
 
-    Example: koop evaluate fit-edmd/3f2a --excitation held
+    Example: koop evaluate --experiment best-edmd --vehicle bmw-320i
     """
     given: Values = {"excitation": excitation, "amplitude": amplitude, "count": count, "steps": steps, "seed": seed}
-    changes: Changes = {"test": given, "evaluate": {"restart": restart}}
-    call = begin(store, experiment, set_, (*fitting.DATA, "fit-edmd", *TEST), changes, workers, cluster)
+    changes: Changes = {"test": given, "evaluate": {"restart": restart}, "vehicle": {"name": vehicle}}
+    call = begin(store, experiment, set_, (*fitting.DATA, *FITS, *TEST), changes, workers, cluster)
     from koopcli.stages import recipes
     from koopcli.stages.verdict import beside
 
@@ -105,17 +112,19 @@ def evaluate(
         test = recipes.test_set(call.experiment, call.simulated(of))
     task = recipes.evaluation(call.experiment, of, test)
     others = beside(call.experiment, task)
+    typed = Typed.of(context)
     call.run(
         task,
         as_json=as_json,
         dry_run=dry_run,
-        extra=lambda artefact: _judge(call, artefact, others),
+        extra=lambda artefact: _judge(call, typed, task, artefact, others),
+        reads=recipes.CHOSEN if of is None else (),
         also=list(others.values()),
     )
 
 
-def _judge(call: Invocation, artefact: Artefact, others: dict[str, Task]) -> dict[str, Any]:
-    """The scores of the ``others`` beside those of ``artefact``, with the verdict, as a table and as JSON."""
+def _judge(call: Invocation, typed: Typed, task: Task, artefact: Artefact, others: dict[str, Task]) -> dict[str, Any]:
+    """The scores of the ``others`` beside those of ``artefact``, with verdict and advice, as a table and as JSON."""
     from koopcli.stages.pipeline import Pipeline
     from koopcli.stages.verdict import NAMES, fitted_to_test_data, verdict
 
@@ -126,23 +135,29 @@ def _judge(call: Invocation, artefact: Artefact, others: dict[str, Task]) -> dic
             "predicts: test it on others, such as those of another seed"
         )
     if not others:
-        call.console.note("no baselines beside it: the data that this predictor was fitted to are no longer there")
+        call.console.note(
+            "there are no baselines: the data that this predictor was fitted to are no longer in the store"
+        )
         return about
     quiet = Pipeline(call.pipeline.store, _Unwarned(call.console), call.pipeline.workers)
     names, figures = {}, {}
-    for name, task in others.items():
-        one = quiet.make(task)
+    for name, other in others.items():
+        one = quiet.make(other)
         names[name], figures[name] = one.record.name, one.figures
         del one  # its scores may be many
     rows = [["this predictor", *_scores(artefact.figures)]]
     rows += [[NAMES[name], *_scores(found)] for name, found in figures.items()]
-    show_table(["RMSE in %", "mean ± std", "median", "max", "re-lifted", "in the data's box"], rows, file=sys.stderr)
+    header = ["RMSE in %", "mean ± std", "median", "max", "mean, re-lifted", "mean, inside the data"]
+    show_table(header, rows, file=sys.stderr)
     for segment in artefact.figures.get("segments", []):
         call.console.note(f"from sample {segment['start']:>4}: RMSE {segment['rmse']:.4g} %")
     found = verdict(artefact.figures, figures)
     (call.console.note if found.beats else call.console.warn)(found.text)
+    told = None if found.beats else advice(typed, call, task, artefact.figures)
+    if told is not None:
+        call.console.note(told)
     scores = {name: {"name": names[name], "rmse": figures[name]["rmse"]} for name in others}
-    return {**about, "baselines": scores, "beats_baselines": found.beats, "verdict": found.text}
+    return {**about, "baselines": scores, "beats_baselines": found.beats, "verdict": found.text, "advice": told}
 
 
 def _scores(figures: dict[str, Any]) -> list[str]:
@@ -155,7 +170,7 @@ def _scores(figures: dict[str, Any]) -> list[str]:
 
 
 class _Unwarned:
-    """A console that keeps to itself what is wrong with a baseline, which is meant to be poor."""
+    """A console that shows no warnings: a baseline is meant to be poor."""
 
     def __init__(self, console: Console) -> None:
         self._console = console

@@ -207,7 +207,7 @@ def fit_eigen(
             metavar=names(Mirror),
             autocompletion=lambda: list(get_args(Mirror)),
             help="Mirror images of the trajectories are data too: of a car that is the same to the left and to the "
-            "right, or at both axles. May be given twice.",
+            "right, or at both axles. The option may be given twice.",
         ),
     ] = None,
     trust: Annotated[
@@ -265,7 +265,7 @@ def baseline(
     ],
     trajectories: Annotated[
         str | None,
-        typer.Argument(autocompletion=complete_name, help="Trajectories it is set beside; made when left out."),
+        typer.Argument(autocompletion=complete_name, help="Trajectories whose plant it predicts; made when left out."),
     ] = None,
     vehicle: VehicleOption = None,
     set_: SetOption = None,
@@ -274,7 +274,7 @@ def baseline(
     dry_run: DryRunOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a prediction that fits nothing, to evaluate beside predictors: what any predictor has to beat.
+    """Make a baseline: a prediction without any fit, which a predictor has to beat.
 
     Example: koop evaluate "$(koop baseline rotation)"
     """

@@ -193,10 +193,10 @@ def show_plan(steps: Sequence[Step], *, as_json: bool) -> None:
     table = []
     for step in steps:
         made = step.state == "make"
-        cost = (f"{step.cost.seconds:.1f} s", size_text(step.cost.bytes)) if made else ("", "")
+        cost = (f"{step.cost.seconds:.1f}", size_text(step.cost.bytes)) if made else ("", "")
         table.append([step.name, step.state, brief(asdict(step.task.settings)), *cost])
-    table.append(["total, roughly", "", "", f"{seconds:.1f} s", size_text(size)])
-    show_table(["artefact", "would", "settings", "time", "size"], table, left=3)
+    table.append(["total, roughly", "", "", f"{seconds:.1f}", size_text(size)])
+    show_table(["artefact", "action", "settings", "seconds", "size"], table, left=3)
 
 
 def brief(settings: dict[str, Any]) -> str:

@@ -17,10 +17,11 @@ DAYS = 7.0
 
 def verify(
     fast: Annotated[
-        bool, typer.Option("--fast", help="Only the records, and whether their objects are there in the right size.")
+        bool,
+        typer.Option("--fast", help="Check only the records, and whether their objects are there in the right size."),
     ] = False,
     full: Annotated[
-        bool, typer.Option("--full", help="Every byte too, and whether each artefact opens (the default).")
+        bool, typer.Option("--full", help="Check every byte too, and whether each artefact opens (the default).")
     ] = False,
     mend: Annotated[
         bool, typer.Option("--repair", help="Put damaged files aside, and make again what can be made again.")
@@ -30,7 +31,7 @@ def verify(
 ) -> None:
     """Check the artefacts of the store for damage. Without --repair nothing is changed.
 
-    Chunks of what is unfinished are checked when they are used.
+    Chunks of unfinished artefacts are checked when they are used.
 
     Example: koop verify --repair
     """
@@ -74,7 +75,9 @@ def verify(
 
 
 def gc(
-    delete: Annotated[bool, typer.Option("--delete", help="Remove it; without this only say what would go.")] = False,
+    delete: Annotated[
+        bool, typer.Option("--delete", help="Remove them; without this option koop only says what would go.")
+    ] = False,
     grace: Annotated[
         float, typer.Option(metavar="DAYS", help=f"Keep whatever is younger than this, pinned or not ({DAYS:g}).")
     ] = DAYS,
@@ -83,8 +86,8 @@ def gc(
 ) -> None:
     """Remove artefacts that nobody keeps: neither pinned, nor young, nor behind any such artefact.
 
-    Also what interrupted commands have left. Damaged files that were put aside stay where they are. With --grace 0
-    nobody else should be at work: what others have just made is not pinned yet.
+    What interrupted commands have left is removed too. Damaged files that were put aside stay where they are. Nobody
+    else should be at work with --grace 0: what others have just made is not pinned yet.
 
     Example: koop gc --grace 30 --delete
     """

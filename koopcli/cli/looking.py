@@ -30,14 +30,15 @@ NameArgument = Annotated[
 
 def ls(
     stage: Annotated[
-        str | None, typer.Argument(autocompletion=complete_stage, help="Only artefacts of this stage.")
+        str | None, typer.Argument(autocompletion=complete_stage, help="List only artefacts of this stage.")
     ] = None,
     stale: Annotated[
         bool,
         typer.Option(
             "--stale",
-            help="Only what this koop would not make again under the same name, and why: its stage, its settings or "
-            "what it was made from have changed. Below it what other code made under a name that this koop gives too.",
+            help="List only artefacts that this koop would not make again under the same name, and why: their stage, "
+            "their settings or what they were made from have changed. Below them stand those that other code made under "
+            "names that this koop gives too.",
         ),
     ] = False,
     store: StoreOption = None,
@@ -106,27 +107,27 @@ def _list(rows: Sequence[dict[str, Any]], why: str, title: str = "") -> None:
             " ".join(row["pins"]),
             brief(row["settings"]),
             *([row["why"]] if why else []),
-            f"{row['seconds']:.1f} s",
+            f"{row['seconds']:.1f}",
             size_text(row["bytes"]) if row["object"] else "missing",
         ]
         for row in rows
     ]
-    header = ["artefact", "made (UTC)", "pinned as", "settings", *([why] if why else []), "took", "size"]
+    header = ["artefact", "made (UTC)", "pinned as", "settings", *([why] if why else []), "seconds", "size"]
     show_table(header, table, title=title, left=len(header) - 2)
 
 
 def show(
     name: NameArgument,
     as_csv: Annotated[
-        bool, typer.Option("--csv", help="The table of an evaluation or the numbers of a figure.")
+        bool, typer.Option("--csv", help="Print the table of an evaluation or the numbers of a figure.")
     ] = False,
     lineage: Annotated[
-        bool, typer.Option("--lineage", help="What it was made from, and that in turn, as a tree; makes nothing.")
+        bool, typer.Option("--lineage", help="Show what it was made from, and that in turn, as a tree; make nothing.")
     ] = False,
     store: StoreOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show an artefact: its figures, every setting behind it, its arrays, and how it was made.
+    """Show an artefact: its numbers, every setting behind it, its arrays, and how it was made.
 
     Example: koop show evaluate/3f2a --csv > scores.csv
     """
@@ -250,7 +251,7 @@ def _settings(task: Task, role: str) -> Iterator[tuple[str, Any]]:
 def _sections(full: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Everything `show` prints, under headings."""
     yield full["name"], {"path": full["path"]}
-    yield "figures", full["figures"]
+    yield "numbers", full["figures"]
     for role, settings in full["settings"].items():
         yield f"settings of {role}", settings
     yield "inputs", full["inputs"]

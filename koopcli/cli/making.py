@@ -115,7 +115,7 @@ def sample(
         typer.Option(
             metavar=names(Mirror),
             autocompletion=lambda: list(get_args(Mirror)),
-            help="greedy: mirror images count as data too, as in fit-eigen. May be given twice.",
+            help="greedy: mirror images count as data too, as in fit-eigen. The option may be given twice.",
         ),
     ] = None,
     vehicle: VehicleOption = None,
@@ -135,9 +135,9 @@ def sample(
 ) -> None:
     """Draw or lay out initial states and inputs.
 
-    Kinds by kinetic energy (ellipsoid, greedy, ball) take mass and yaw inertia from the vehicle, those of cars under
-    way (drive, drive-test) the radius of its wheels; greedy, which simulates as it goes, and manoeuvre, which steers,
-    all of it; the others are of none.
+    Kinds by kinetic energy (ellipsoid, ball) take mass and yaw inertia from the vehicle, those of cars under way
+    (drive, drive-test) take the radius of its wheels. Greedy simulates as it goes and a manoeuvre steers, so these take
+    all of it. The other kinds depend on no vehicle.
 
     Example: koop sample manoeuvre sine-with-dwell --vehicle rimac-2018
     """

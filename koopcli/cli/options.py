@@ -22,7 +22,9 @@ StoreOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the name or table.")]
 DryRunOption = Annotated[
     bool,
-    typer.Option("--dry-run", help="Say what would be made or reused, how long and how large; make nothing."),
+    typer.Option(
+        "--dry-run", help="Say what would be made or reused, how long that takes and how large it is; make nothing."
+    ),
 ]
 SetOption = Annotated[
     list[str] | None,
@@ -30,7 +32,7 @@ SetOption = Annotated[
         "--set",
         metavar="STAGE.KEY=VALUE",
         help="Change one setting of any stage behind this one, such as vehicle.Jzz=1731 or sample.box=[20,20,5]; "
-        "docs/cli.md lists them. May be repeated; the command's own options win.",
+        "docs/cli.md lists them. It may be repeated; the command's own options win.",
     ),
 ]
 WorkersOption = Annotated[
@@ -43,7 +45,7 @@ ClusterOption = Annotated[
         "--cluster",
         metavar="ADDRESS",
         help="Share the work on a Dask cluster instead: the address of its scheduler, or the .json file that it wrote. "
-        "Needs the extra 'dask', and a store that all workers see.",
+        "It needs the extra 'dask' and a store that all workers see.",
     ),
 ]
 ExperimentOption = Annotated[
@@ -52,7 +54,7 @@ ExperimentOption = Annotated[
         "--experiment",
         metavar="NAME|FILE",
         autocompletion=complete_experiment,
-        help="Where settings come from: paper, smoke or a TOML file.",
+        help="Where settings come from: paper, best-edmd, best-eigen, smoke or a TOML file.",
     ),
 ]
 VehicleOption = Annotated[

@@ -24,17 +24,17 @@ if TYPE_CHECKING:
 
 def plot(
     figure: Annotated[
-        str | None, typer.Argument(autocompletion=complete_figure, help="Name of the figure; --list shows them.")
+        str | None, typer.Argument(autocompletion=complete_figure, help="Name of the figure; --list shows them all.")
     ] = None,
     artefacts: Annotated[
         list[str] | None,
-        typer.Argument(autocompletion=complete_name, metavar="ARTEFACT", help="What to draw; made when left out."),
+        typer.Argument(autocompletion=complete_name, metavar="ARTEFACT", help="Artefacts to draw; made when left out."),
     ] = None,
     output: OutputOption = None,
     csv_: CsvOption = None,
     label: Annotated[
         list[str] | None,
-        typer.Option(metavar="TEXT", help="What an artefact is called beside others: one for each, in their order."),
+        typer.Option(metavar="TEXT", help="Label of an artefact beside others: one for each, in their order."),
     ] = None,
     list_: Annotated[bool, typer.Option("--list", help="List the figures.")] = False,
     set_: SetOption = None,
@@ -43,7 +43,9 @@ def plot(
     dry_run: DryRunOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Draw a figure from artefacts, making them when they are not named.
+    """Draw a figure of artefacts, making them when they are not named.
+
+    A figure that can be drawn for either fit makes the one that the experiment is about.
 
     Example: koop plot error-map -o errors.pdf
     """
@@ -58,7 +60,7 @@ def plot(
     check_outputs(output, csv_, as_json=as_json)
     call = begin(store, experiment, set_, SECTIONS)
     from koopcli.figures.registry import FIGURES
-    from koopcli.stages import drawn
+    from koopcli.stages import drawn, recipes
 
     kind, made = FIGURES[figure], drawn.MADE[FIGURES[figure].made]
     if artefacts and kind.takes == "nothing":
@@ -68,7 +70,7 @@ def plot(
         sources = [call.named(one, drawn.TAKES[kind.takes], f"what '{figure}' draws", told) for one in artefacts]
     else:
         for name, _ in flat(call.changes):
-            if f"{name}.".startswith(made.fixed):
+            if made.chooses(name, call.experiment):
                 raise UsageError(f"--set {name} changes nothing in the figure '{figure}': {made.instead}")
         sources = made.tasks(call.experiment)
     labels = _labels(label, sources, kind)
@@ -79,10 +81,9 @@ def plot(
             call.console.note("add -o FILE.png, .svg or .pdf to write the image, --csv FILE for its numbers")
 
     task = drawn.figure(figure, sources, image, call.experiment, call.simulated, labels)
-    told_by = [f"plot.{name}" for name in kind.told]
-    call.run(
-        task, as_json=as_json, dry_run=dry_run, extra=export, reads=(*made.reads, *told_by), table_out=csv_ == STDOUT
-    )
+    reads = [*made.reads, *(f"plot.{name}" for name in kind.told)]
+    reads += recipes.CHOSEN if made.fit is not None and not artefacts else ()
+    call.run(task, as_json=as_json, dry_run=dry_run, extra=export, reads=reads, table_out=csv_ == STDOUT)
 
 
 def _labels(given: list[str] | None, sources: list[Task], kind: FigureKind) -> dict[Task, str] | None:

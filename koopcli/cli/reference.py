@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields
 from textwrap import fill
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from types import UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import typer
 
 from koopcli.cli.app import app
 from koopcli.config.pictures import PlotOptions
 from koopcli.config.samples import SAMPLES
-from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
+from koopcli.config.settings import About, Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
 from koopcli.vehicles.parameters import VehicleParameters
 
 DECLARED: tuple[tuple[str, Any], ...] = (
+    ("experiment", About),
     ("vehicle", VehicleParameters),
     *((f"sample.{kind}", cls) for kind, cls in SAMPLES.items()),
     ("simulate", Simulate),
@@ -64,6 +66,8 @@ def _plain(value: Any) -> str:
 
 
 def _allowed(kind: Any, bounds: Mapping[str, Any]) -> str:
+    if get_origin(kind) in (Union, UnionType):
+        (kind,) = [one for one in get_args(kind) if one is not type(None)]
     if get_origin(kind) is tuple:
         return f"list: {_allowed(get_args(kind)[0], bounds)}"
     if get_origin(kind) is Literal:

@@ -41,8 +41,12 @@ ROWS = 40  # of the table on the screen
 
 def sweep(
     method: Annotated[
-        MethodName, typer.Argument(metavar="fit-edmd|fit-eigen|baseline", help="What makes the predictors.")
-    ] = "fit-edmd",
+        MethodName | None,
+        typer.Argument(
+            metavar="fit-edmd|fit-eigen|baseline",
+            help="What makes the predictors (the fit that the experiment is about, else fit-edmd).",
+        ),
+    ] = None,
     set_: Annotated[
         list[str] | None,
         typer.Option(
@@ -72,9 +76,9 @@ def sweep(
     """Fit and score a predictor for every combination of some settings.
 
     Every cell of the grid is an evaluation like any other, with its predictor and data: what is there is reused, and an
-    interrupted sweep goes on where it stopped. What settings do not go together, or fail, is left out and said. At the
-    end stand a table, in which seeds count as repetitions, and a figure. With --shard the parts of a sweep may run
-    anywhere that sees the store; the same command without it then puts all of them together.
+    interrupted sweep goes on where it stopped. Cells that fail, or whose settings do not go together, are left out and
+    named. The sweep ends with a table, in which seeds count as repetitions, and a figure. With --shard the parts of a
+    sweep may run anywhere that sees the store; the same command without it then puts all of them together.
 
     Example: koop sweep --set fit-edmd.order=1:12 --set sample.seed=0:29 --workers 4
     """
@@ -103,7 +107,7 @@ def sweep(
         return
     call.console.note(f"store: {call.pipeline.store.root}")
     if len(chosen) < len(grid):
-        call.console.note(f"{len(chosen)} of the {len(grid)} cells of the grid")
+        call.console.note(f"{len(chosen)} of the {len(grid)} cells of the grid are made")
     with call.pipeline.workers:
         failed = _make(call, [cell.task for cell in chosen])
     made = [cell for cell in chosen if cell.task not in failed]
@@ -142,7 +146,7 @@ def sweep(
         call.print_name(artefact.record.name, table_out=csv_ == STDOUT)
     if failed:
         raise InvalidValueError(
-            f"{len(failed)} of {len(chosen)} cells failed and are not in the table: mend what is said of them above"
+            f"{len(failed)} of {len(chosen)} cells failed and are not in the table: the warnings above say why"
         )
 
 
@@ -225,10 +229,10 @@ def _show_plan(call: Invocation, tasks: Sequence[Task], *, as_json: bool) -> Non
         print_json({"dry_run": True, "cells": len(tasks), "stages": rows})
         return
     table = [
-        [name, f"{row['make']:.0f}", f"{row['reuse']:.0f}", f"{row['seconds']:.1f} s", size_text(row["bytes"])]
+        [name, f"{row['make']:.0f}", f"{row['reuse']:.0f}", f"{row['seconds']:.1f}", size_text(row["bytes"])]
         for name, row in rows.items()
     ]
-    show_table([f"of {len(tasks)} cells", "make", "reuse", "time of one core", "size"], table)
+    show_table([f"of {len(tasks)} cells", "make", "reuse", "seconds of one core", "size"], table)
 
 
 def _show_scores(table: Swept) -> None:
@@ -255,7 +259,7 @@ def _show_scores(table: Swept) -> None:
         row.append(f"{scores['diverged'].sum():.0f}")
         rows.append(row)
     over = ("seeds", "median", "least", "most") if seeds else ("mean", "std", "median", "max")
-    title = "RMSE in %, the mean over trajectories; over seeds" if seeds else "RMSE in %, over trajectories"
+    title = "RMSE in %: mean over trajectories, spread over seeds" if seeds else "RMSE in %, over trajectories"
     header = [*shown, "functions", *over, "diverged"]
     show_table(header, rows, title=title, left=len(shown), file=sys.stderr)
     if len(table.groups()) > ROWS:

@@ -55,7 +55,7 @@ def ls(as_json: JsonOption = False) -> None:
 
 @vehicle.command("show")
 def show(name: NameArgument, dt: DtOption = Simulate.dt, as_json: JsonOption = False) -> None:
-    """Show a vehicle: every parameter with its unit, its source, and the numbers that follow.
+    """Show a vehicle: every parameter with its unit, its source, and the numbers that follow from it.
 
     Example: koop vehicle show bmw-320i
     """
@@ -66,7 +66,7 @@ def show(name: NameArgument, dt: DtOption = Simulate.dt, as_json: JsonOption = F
 
 @vehicle.command("check")
 def check(file: NameArgument, dt: DtOption = Simulate.dt, as_json: JsonOption = False) -> None:
-    """Check a vehicle file, say what is unusual about it, and show the numbers that follow.
+    """Check a vehicle file, say what is unusual about it, and show the numbers that follow from it.
 
     A file that cannot be used ends with the one line that says why; docs/vehicles.md has the schema.
 
@@ -83,7 +83,7 @@ def check(file: NameArgument, dt: DtOption = Simulate.dt, as_json: JsonOption = 
     for remark in said:
         console.warn(remark)
     plants = ", ".join(plants_of(found.parameters))
-    console.note(f"{file} can be used, for the plants {plants}" + ("" if said else "; nothing unusual about it"))
+    console.note(f"{file} can be used with the plants {plants}" + ("" if said else "; nothing about it is unusual"))
 
 
 def _print(found: VehicleFile, dt: float, said: list[str], *, as_json: bool) -> None:

@@ -11,6 +11,7 @@ from koopcli.errors import InvalidValueError, UsageError
 from koopcli.parsing import DEEPEST, TooDeepError, parse_toml
 
 SECTIONS = (
+    "experiment",
     "vehicle",
     "sample",
     "simulate",

@@ -52,7 +52,7 @@ class Driven(Sampled):
         return self.count * (N_X + N_U * (self.input_steps or 1))
 
     def settled(self) -> Self:
-        """The same sample with magnitudes that do not matter at zero: one sample, one key."""
+        """The same sample: magnitudes without inputs are reset to zero."""
         return replace(self, torque=0.0, steer=0.0, steer_rear=0.0) if self.excitation == "none" else self
 
 
@@ -108,5 +108,5 @@ class ManoeuvreSample(Sampled):
         return N_X + N_U * self.horizon
 
     def settled(self) -> ManoeuvreSample:
-        """The same sample with its speed written out."""
+        """The same sample: its speed is written out."""
         return replace(self, speed=self.speed or MANOEUVRES[self.name].speed)

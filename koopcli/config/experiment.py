@@ -12,7 +12,7 @@ from koopcli.config.changes import SECTIONS, Changes, Values
 from koopcli.config.data import locate
 from koopcli.config.pictures import PlotOptions
 from koopcli.config.samples import ELSEWHERE, OF_SIMULATION, OF_VEHICLE, SAMPLED_FOR, SAMPLES, SampleSettings
-from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
+from koopcli.config.settings import About, Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, KoopError, UsageError
 from koopcli.parsing import parse_toml
 from koopcli.text import read_text
@@ -38,6 +38,7 @@ class Experiment:
     """Settings of every stage; :meth:`sample` and :meth:`test` give those that depend on a kind and on the vehicle."""
 
     layers: tuple[Layer, ...]
+    about: About
     simulate: Simulate
     fit_edmd: FitEdmd
     fit_eigen: FitEigen
@@ -157,6 +158,7 @@ def load_experiment(name: str, changes: Changes) -> Experiment:
     vehicle = Layer({"simulate": {"vehicle": _vehicle(layers)}}, COMMAND_LINE, Path())
     return Experiment(
         layers=layers,
+        about=_section(About, "experiment", layers),
         simulate=_section(Simulate, "simulate", [vehicle, *layers]),
         fit_edmd=_section(FitEdmd, "fit-edmd", layers),
         fit_eigen=_section(FitEigen, "fit-eigen", layers),

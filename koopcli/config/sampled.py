@@ -50,5 +50,5 @@ class Sampled:
         return 7 * self.count
 
     def settled(self) -> Self:
-        """The same sample with what does not matter at its default: one sample, one key."""
+        """The same sample: settings that have no effect are reset, so that they are not in the key."""
         return self

@@ -86,7 +86,7 @@ class BoxSample(Sampled):
         return self.count * (len(self.box) + 4 * (self.input_steps or 1))
 
     def settled(self) -> BoxSample:
-        """The same sample with the amplitude that does not matter at zero: one sample, one key."""
+        """The same sample: an amplitude without inputs is reset to zero."""
         return replace(self, amplitude=0.0) if self.excitation == "none" else self
 
 
@@ -124,7 +124,7 @@ class PointSample(Sampled):
         return len(self.x0) + 4 * (self.input_steps or 1)
 
     def settled(self) -> PointSample:
-        """The same sample with the amplitude that does not matter at zero: one sample, one key."""
+        """The same sample: an amplitude without inputs is reset to zero."""
         return replace(self, amplitude=0.0) if self.excitation == "none" else self
 
 
@@ -184,7 +184,7 @@ class GreedySample(Sampled):
         return int(self.budget / (self.steps * self.dt) + 1e-9)
 
     def settled(self) -> GreedySample:
-        """The same sample without what the plant does not use: one sample, one key."""
+        """The same sample: what the plant does not use of the vehicle is reset."""
         return replace(self, vehicle=used_of(self.vehicle, SAMPLED_FOR[self.kind]))
 
 

@@ -1,9 +1,9 @@
 """The settings of every stage: frozen, typed, bounded, with the paper's values as defaults.
 
 The allowed names are literals, so that `koop --help` needs no numerics; a test holds them equal to the registries.
-A stage's settings are part of its key. Whatever does not change a result is not in here (the size of a chunk moves last
-bits of a score, and says which rows a committed part holds), and ``settled`` gives a setting that another one switches
-off its default, so that it is not in the key either.
+A stage's settings are part of its key. Whatever does not change a result is not in here; the size of a chunk is here,
+because it moves the last bits of a score and says which rows a committed part holds. ``settled`` resets settings that
+have no effect, so that they are not in the key.
 """
 
 from __future__ import annotations
@@ -30,7 +30,17 @@ LiftName = Literal["nearest", "linear", "mls", "polyharmonic"]
 Coordinates = Literal["state", "world"]
 Scaling = Literal["raw", "extent"]
 BaselineKind = Literal["hold", "rotation", "linearisation"]
+FitName = Literal["fit-edmd", "fit-eigen"]
 CHUNKS = {"forces": 500_000, "slips": 200_000, "wheels": 200_000}  # samples; fewer at a time take longer each
+
+
+@dataclass(frozen=True)
+class About:
+    """What an experiment is about. It is part of no key: a fit is the same, whoever asks for it."""
+
+    fit: FitName | None = setting(
+        None, help="the fit that evaluate, sweep and plot make; else fit-edmd, and in figures the one they are for"
+    )
 
 
 @dataclass(frozen=True)
@@ -64,7 +74,7 @@ class Simulate:
     )
 
     def settled(self) -> Simulate:
-        """The same simulation with what is left open as its plant has it, and what it does not use at its default."""
+        """The same simulation: what is left open is written out as its plant has it, what has no effect is reset."""
         plant = self.plant or "forces"
         own = {name.partition(".")[2] for name in UNUSED[plant] if name.startswith("simulate.")}
         idle = {name: getattr(Simulate, name) for name in own}
@@ -98,7 +108,7 @@ class FitEdmd:
     )
 
     def settled(self) -> FitEdmd:
-        """The same fit with everything that its basis does not use at its default."""
+        """The same fit: what its basis does not use is reset."""
         idle = {name for names in OF_BASIS.values() for name in names} - set(OF_BASIS[self.basis])
         return replace(self, **{name: getattr(FitEdmd, name) for name in idle})
 
@@ -161,7 +171,7 @@ class FitEigen:
     trust: bool = setting(False, help="window horizon: estimate errors from data held back")
 
     def settled(self) -> FitEigen:
-        """The same fit with what is left open written out, and without what another setting switches off."""
+        """The same fit: what is left open is written out, what has no effect is reset."""
         idle = {name: getattr(FitEigen, name) for name in self.idle()}
         found = replace(self, **{**idle, **({"boundary": "optimal"} if "boundary" in idle else {})})
         if found.boundary == "thin-plate" and found.cut is None:
@@ -194,7 +204,7 @@ NEIGHBOURS = {"mls": 24, "polyharmonic": 60}  # at a time, unless told otherwise
 
 @dataclass(frozen=True)
 class Baseline:
-    """A prediction that fits nothing."""
+    """A baseline: a prediction without any fit."""
 
     kind: BaselineKind = setting(
         "hold", help="the first state kept, turned at a constant yaw rate, or linearised there"

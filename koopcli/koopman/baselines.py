@@ -1,4 +1,4 @@
-"""Predictions that fit nothing: what any predictor has to beat (docs/equations.md 8)."""
+"""Baselines: predictions without any fit, which a predictor has to beat (docs/equations.md 8)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Forecast(Content):
     """``hold`` keeps the first state, ``rotation`` turns the velocity at a constant yaw rate (8.1), ``linearisation``
     follows ẋ = f(x0, 0) + J (x - x0) + J_u u (8.2).
 
-    Scored like a predictor: ``dt`` in s, ``coverage`` of the trajectories it is set beside, ``plant`` as JSON.
+    It is scored like a predictor: ``dt`` in s, ``coverage`` of the trajectories it is compared on, ``plant`` as JSON.
     """
 
     kind: str

@@ -76,14 +76,7 @@ def fit(
     Raises ``InvalidValueError`` for fewer samples than unknowns and for data that are not finite.
     """
     pairs = Transitions.of(data)
-    samples, n_u = len(pairs), len(pairs.input_channels)
-    unknowns = basis.functions * (1 + n_u) if method.bilinear else basis.functions + n_u
-    if samples < unknowns:
-        each = f", {unknowns} bilinear terms together" if method.bilinear else ""
-        raise InvalidValueError(
-            f"{samples} samples cannot determine {basis.functions} functions and {n_u} inputs{each}: "
-            "lower the order or the number of centres, or sample more"
-        )
+    check_samples(len(pairs), basis.functions, len(pairs.input_channels), bilinear=method.bilinear)
     over = over or here(pairs, progress)
     seen = seen or survey(pairs, over)
     product = pairs.product
@@ -113,6 +106,17 @@ def fit(
         solved_by=found.solved_by,
         plant=pairs.plant,
     )
+
+
+def check_samples(samples: int, functions: int, inputs: int, *, bilinear: bool) -> None:
+    """Raise ``InvalidValueError`` for fewer ``samples`` than unknowns of each lifted state."""
+    unknowns = functions * (1 + inputs) if bilinear else functions + inputs
+    if samples < unknowns:
+        each = f", {unknowns} bilinear terms together" if bilinear else ""
+        raise InvalidValueError(
+            f"{samples} samples cannot determine {functions} functions and {inputs} inputs{each}: "
+            "lower the order or the number of centres, or sample more"
+        )
 
 
 def why_deficient(data: Data, predictor: Predictor, seen: Survey | None = None) -> str:

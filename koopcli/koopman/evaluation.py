@@ -56,34 +56,46 @@ class Forecaster(Protocol):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Evaluation(Content):
-    """Scores of n trajectories: ``rmse``, ``rmse_printed``, ``rmse_relift`` (n,) in percent, and ``start_error`` (n,),
-    that of the prediction at k = 0 alone; ``max_error`` (n, n_x) the largest error of each state; ``in_domain`` (n,)
-    the share of true samples inside the training box; ``distance`` (n,) of x0 to the training states in half-widths
-    of that box, ``outside`` (n,) whether x0 lies outside their convex hull; ``bound`` (n,) in percent what the
-    predictor's own estimate says ``rmse`` stays below, not a number where it has none; ``diverged`` and
-    ``diverged_relift`` (n,) of the two kinds of prediction; ``x0`` (n, n_x). A diverged prediction keeps its row and
-    stays out of the figures of its kind. With predictions that ``restart`` every so many steps each has a row, and
-    ``start`` (n,) is the sample it starts from; ``steps`` is then the longest of them.
+    """Scores of n predictions, one row each. A diverged prediction keeps its row and stays out of the numbers of its
+    kind.
     """
 
     x0: FloatArray
+    """First states (n, n_x)."""
     rmse: FloatArray
+    """Errors (n,) in percent of predictions that are lifted once."""
     rmse_printed: FloatArray
+    """The same (n,) in percent, by the formula as the paper prints it."""
     rmse_relift: FloatArray
+    """Errors (n,) in percent of predictions that are lifted afresh at every step."""
     start_error: FloatArray
+    """Errors (n,) in percent at k = 0 alone."""
     max_error: FloatArray
+    """The largest error (n, n_x) of each state, in its unit."""
     in_domain: FloatArray
+    """The share (n,) of true samples inside the training box."""
     distance: FloatArray
+    """Distances (n,) of x0 to the training states, in half-widths of their box."""
     outside: BoolArray
+    """Whether x0 lies outside the convex hull of the training states (n,)."""
     bound: FloatArray
+    """What the predictor's own estimate says ``rmse`` stays below (n,) in percent; not a number without any."""
     diverged: BoolArray
+    """Whether the prediction that is lifted once diverges (n,)."""
     diverged_relift: BoolArray
+    """Whether the prediction that is lifted afresh diverges (n,)."""
     start: IndexArray
+    """The sample (n,) that each prediction starts from, above 0 where predictions restart."""
     steps: int
+    """Steps of the longest prediction."""
     first: int
+    """The first scored sample after the start of a prediction."""
     functions: int
+    """Dimension of the predictor's lifted state."""
     state_channels: Channels
+    """Names and units of the states."""
     restart: int | None = None
+    """Steps until a prediction starts afresh from the true state, None for never."""
 
     def __repr__(self) -> str:
         rmse, lost = metrics.summary(self.rmse[~self.diverged]), int(self.diverged.sum())
@@ -93,7 +105,7 @@ class Evaluation(Content):
         )
 
     def figures(self) -> Meta:
-        """The figures that scripts read (`--json`)."""
+        """The numbers that scripts read (`--json`)."""
         valid = ~self.diverged
         inside = valid & (self.in_domain == 1)
         with np.errstate(invalid="ignore"):

@@ -30,34 +30,46 @@ EXTRAPOLATES = "continue the functions fitted inside"
 class Predictor(Content):
     """z⁺ = A z + B u, x̂ = C z with z = ψ(x): eqs. (4.1), (4.2) of docs/equations.md. A bilinear one adds Σ_i u_i N_i z
     (4.6), or steps by its ``generator`` (4.9), of which A, B and N are then the value and the slope at u = 0.
-
-    ``A`` (N, N) as a matrix or by its rates, ``B`` (N, n_u), ``C`` (n_x, N), ``N`` the N_i (n_u, N, N) or None,
-    ``generator`` (1 + n_u, N, N) in 1/s or None; ``dt`` in s; ``coverage``: where the training states lie; ``plant``
-    what was identified, as JSON; ``rank`` of ``directions`` and ``condition`` of the regression; ``horizon``: the steps
-    that it may be asked for, None for any; ``missed``: the share of the data in percent that its exponentials do not
-    hold; ``beyond``: what it does outside the hull of its data; ``trust``: an estimate of its errors; ``solved_by``:
-    how the regression was solved, as :mod:`koopcli.koopman.blockwise` and ``product`` name it.
     """
 
     observables: Lift
+    """The lift ψ."""
     A: FloatArray | Modes
+    """(N, N), as a matrix or by its rates."""
     B: FloatArray
+    """(N, n_u)."""
     C: FloatArray
+    """(n_x, N)."""
     dt: float
+    """Sampling period in s."""
     coverage: Coverage
+    """Where the training states lie."""
     state_channels: Channels
+    """Names and units of x."""
     input_channels: Channels
+    """Names and units of u."""
     rank: int
+    """How many directions the data determine."""
     directions: int
+    """How many directions the regression has."""
     condition: float
+    """Condition number of the regression."""
     horizon: int | None = None
+    """The most steps that it may be asked for, None for any number."""
     plant: Meta = field(default_factory=dict)
+    """What was identified, as JSON."""
     N: FloatArray | None = None
+    """The N_i (n_u, N, N) of a bilinear one."""
     generator: FloatArray | None = None
+    """(1 + n_u, N, N) in 1/s, of one in continuous time."""
     missed: float | None = None
+    """The share of the data in percent that its exponentials do not represent."""
     beyond: str = EXTRAPOLATES
+    """What it does outside the hull of its data."""
     trust: Trust | None = None
+    """An estimate of its errors."""
     solved_by: str = ""
+    """How the regression was solved, as :mod:`koopcli.koopman.blockwise` and ``product`` name it."""
 
     def __repr__(self) -> str:
         """Its spectral radius is told where it is known already, or costs nothing."""

@@ -107,7 +107,7 @@ def _floor(run: Run) -> Finding:
         order = min(linear, key=lambda one: linear[one])
         text = f"{INPUTS[excitation]}: {_percent(linear[order])} (order {order})"
         for terms in ("bilinear", "generator"):
-            label = blocks.prospect_name(run.experiment, blocks.bilinear(run.experiment, terms))
+            label = blocks.outlook_name(run.experiment, blocks.bilinear(run.experiment, terms))
             ((_, figures),) = scores(run, blocks.OTHERS, label=label, draw=draw, excitation=excitation)
             text += f", {terms} {_percent(mean(figures))}"
             best[excitation] = min(mean(figures), best.get(excitation, math.inf))

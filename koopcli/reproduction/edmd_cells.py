@@ -13,7 +13,7 @@ from koopcli.config.settings import OF_BASIS, BasisName, FitEdmd, ForcePer, Term
 from koopcli.errors import InvalidValueError
 from koopcli.stages import recipes, verdict
 from koopcli.stages.base import Task
-from koopcli.stages.makers import prospect
+from koopcli.stages.makers import outlook
 
 SWEEP, OTHERS, BASELINES, FORCES, PER_WHEEL, TEST_GRID, TEXTBOOK, DRAWN, DRAWS = (
     "sweep",
@@ -145,7 +145,7 @@ def _forces(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
     best = recipes.with_order(experiment, best_order(experiment)).fit_edmd
     for level in experiment.reproduce.training_forces:
         for fit in (best, bilinear(experiment, "bilinear")):
-            label = f"{prospect_name(experiment, fit)}, ±{level:g} N"
+            label = f"{outlook_name(experiment, fit)}, ±{level:g} N"
             yield from _scored(experiment, FORCES, label, first, fit, levels=(level,), columns=columns)
 
 
@@ -169,13 +169,13 @@ def _settings(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
     for fit in (best, bilinear(experiment, "bilinear"), bilinear(experiment, "generator")):
         predictor = recipes.fit_edmd(replace(experiment, fit_edmd=fit), data)
         task = recipes.evaluation(restarting, predictor)
-        label = f"{prospect(predictor).name}, restart every {RESTART}"
+        label = f"{outlook(predictor).name}, restart every {RESTART}"
         yield Cell(DRAWN, label, first.name, _order(fit), "fresh"), task
 
 
-def prospect_name(experiment: Experiment, fit: FitEdmd) -> str:
+def outlook_name(experiment: Experiment, fit: FitEdmd) -> str:
     """What the predictor of a fit is called."""
-    return prospect(recipes.fit_edmd(replace(experiment, fit_edmd=fit))).name
+    return outlook(recipes.fit_edmd(replace(experiment, fit_edmd=fit))).name
 
 
 def _scored(
@@ -189,7 +189,7 @@ def _scored(
 ) -> Iterator[tuple[Cell, Task]]:
     """One fit under each kind of test inputs; its own name is the label where there is none."""
     predictor = recipes.fit_edmd(replace(experiment, fit_edmd=fit), training_set(experiment, training, **changed))
-    named = prospect(predictor).name if label is None else label
+    named = outlook(predictor).name if label is None else label
     for kind in excitations or experiment.reproduce.excitations:
         yield Cell(block, named, training.name, _order(fit), kind), _evaluated(experiment, predictor, kind)
 

@@ -12,7 +12,7 @@ from koopcli.config.settings import FitEigen
 from koopcli.errors import InvalidValueError
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
-from koopcli.stages.makers import prospect
+from koopcli.stages.makers import outlook
 from koopcli.vehicles.handling import G
 
 CUT = 1e-10  # of the readings with optimal boundary functions
@@ -76,7 +76,7 @@ def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
             label, fit = f"grip × {scale:g}, optimal{cut_text(CUT)}", replace(optimal, cut=CUT)
             yield Cell(GRIP, label, vehicle, first), evaluated(gripping, fit, first)
         for predictor in recipes.beside(there, _training(there)):
-            yield Cell(BASELINES, prospect(predictor).name, vehicle, first), _scored(there, predictor, first)
+            yield Cell(BASELINES, outlook(predictor).name, vehicle, first), _scored(there, predictor, first)
 
 
 def evaluated(experiment: Experiment, fit: FitEigen, seed: int, seconds: float | None = None) -> Task:

@@ -108,16 +108,19 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Prospect:
-    """What is known of a predictor before it is made: its lifted states, the steps it may be asked for, and its
-    ``name``; the ``data`` and ``order`` of one that is a point of a curve against the order.
-    """
+class Outlook:
+    """What a fit will be, before it is made: its size, its longest horizon, its label, and what its steps cost."""
 
     functions: int
+    """Dimension of the lifted state."""
     horizon: int | None
+    """The most steps of a prediction, None for any number."""
     name: str
+    """What it is called in tables and figures."""
     data: str = ""
+    """What its training data are called."""
     order: int | None = None
+    """The order of its basis, if that has one."""
     a_step: float = 1.5e-4
     """Seconds for one step from states lifted afresh, however few they are."""
     a_state: float = 0.0
@@ -137,9 +140,9 @@ class Stage:
     unpack: Callable[[Packed], Any]
     """The record from storage."""
     figures: Callable[[Any], Meta]
-    """The record's figures for ``--json`` and the lines on stderr."""
-    describe: Callable[[Meta], str]
-    """Those figures in a few words."""
+    """The record's numbers for ``--json`` and the lines on stderr."""
+    describe: Callable[[Meta, Any], str]
+    """Those numbers, of what was made with its settings, in a few words."""
     check: Callable[[Task], None]
     """Refuse, before anything upstream is made, a task that cannot work."""
     estimate: Callable[[Task], Cost]
@@ -148,5 +151,5 @@ class Stage:
     """Of a stage that asks for chunks: (settings, inputs, rows, progress) -> what one of them holds."""
     keep: Callable[[Any], Any] = lambda content: content
     """What of an input's content ``run`` works with: the rest is let go of as soon as it is read."""
-    predicts: Callable[[Task], Prospect] | None = None
-    """Of a stage that makes predictors: what a task's one will be."""
+    predicts: Callable[[Task], Outlook] | None = None
+    """Of a stage that makes predictors: what the predictor of a task will be."""

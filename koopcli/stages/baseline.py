@@ -1,4 +1,4 @@
-"""Stage ``baseline``: a prediction that fits nothing, set beside predictors of the same trajectories."""
+"""Stage ``baseline``: a prediction without any fit, to compare predictors of the same trajectories with."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from koopcli.checks import build
 from koopcli.config.settings import Baseline
 from koopcli.koopman.baselines import Forecast
 from koopcli.koopman.edmd import coverage
-from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task
+from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task
 from koopcli.stages.usable import finished
 
 NAMES = {
@@ -21,11 +21,11 @@ def _run(settings: Baseline, inputs: Inputs, context: Context) -> Forecast:
     return Forecast(settings.kind, t.dt, coverage(t), t.state_channels, t.input_channels, t.plant)
 
 
-def _prospect(task: Task) -> Prospect:
+def _outlook(task: Task) -> Outlook:
     kind = task.settings.kind
     if kind == "linearisation":  # a Jacobian of the plant by differences, at every state
-        return Prospect(0, None, NAMES[kind], a_step=3e-3, a_state=1e-5)
-    return Prospect(0, None, NAMES[kind], a_step=5e-5)
+        return Outlook(0, None, NAMES[kind], a_step=3e-3, a_state=1e-5)
+    return Outlook(0, None, NAMES[kind], a_step=5e-5)
 
 
 STAGE = Stage(
@@ -35,8 +35,8 @@ STAGE = Stage(
     run=_run,
     unpack=Forecast.unpack,
     figures=lambda forecast: {"kind": forecast.kind, "functions": forecast.functions},
-    describe=lambda f: f"{f['kind']}, fits nothing",
+    describe=lambda f, settings: f"{NAMES[f['kind']]}, a baseline without any fit",
     check=lambda task: None,
     estimate=lambda task: Cost(0.1, 2e6),
-    predicts=_prospect,
+    predicts=_outlook,
 )

@@ -11,7 +11,7 @@ from koopcli.config.driving import ManoeuvreSample
 from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Cone, ImageFormat, Plot, Series
 from koopcli.config.samples import SAMPLED_FOR
-from koopcli.config.settings import Simulate
+from koopcli.config.settings import FitName, Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError
 from koopcli.figures import source_digest
 from koopcli.figures.registry import FIGURES, FigureKind
@@ -37,68 +37,100 @@ TOLD_BESIDE = ("test", "plot")  # sections that matter beside a named predictor
 
 @dataclass(frozen=True)
 class Made:
-    """What a figure makes when nothing is named.
+    """What a figure makes when nothing is named."""
 
-    ``reads``: beginnings of settings that matter beside those of the tasks; ``fixed``: of those that the figure
-    chooses itself, with what to do ``instead`` of changing them.
-    """
-
-    tasks: Callable[[Experiment], list[Task]]
+    recipe: Callable[[Experiment], list[Task]]
+    """The artefacts that it draws."""
+    fit: FitName | None = None
+    """The fit that it makes, if any, unless the experiment is about the other one and the figure follows that."""
+    follows: bool = False
+    """Whether it can be drawn for either fit."""
     reads: tuple[str, ...] = ()
+    """Beginnings of settings that matter beside those of the tasks."""
     fixed: tuple[str, ...] = ()
+    """Beginnings of settings that the figure chooses itself."""
     instead: str = ""
+    """What to do instead of changing those."""
+
+    def tasks(self, experiment: Experiment) -> list[Task]:
+        """The artefacts that it draws. Raises ``InvalidValueError`` for an experiment about a fit it is not for."""
+        about = experiment.about.fit
+        if self.fit is not None and not self.follows and about not in (None, self.fit):
+            raise InvalidValueError(
+                f"the figure makes {self.fit} predictors, the experiment is about {about}: name what to draw, or add "
+                f"--set experiment.fit={self.fit}"
+            )
+        return self.recipe(experiment)
+
+    def chooses(self, name: str, experiment: Experiment) -> bool:
+        """Whether the figure chooses the setting ``name`` itself; a figure that follows leaves the fit open."""
+        own = f"{experiment.about.fit or self.fit}."
+        return f"{name}.".startswith(self.fixed) and not (self.follows and name.startswith(own))
 
 
 MADE: dict[str, Made] = {
     "orders": Made(
         recipes.order_sweep,
+        fit="fit-edmd",
         reads=("reproduce.orders",),
         fixed=("fit-edmd.order", "reproduce.draw", "reproduce.excitations"),
         instead="it sweeps reproduce.orders with sample.draw and test.excitation",
     ),
     "draws": Made(
         recipes.draw_sweep,
+        fit="fit-edmd",
         reads=("reproduce.orders", "reproduce.full_draws"),
         fixed=("fit-edmd.order", "sample.seed", "sample.grid.seed", "reproduce.draw"),
         instead="it sweeps reproduce.orders over reproduce.full_draws random grids",
     ),
     "sweep": Made(
         lambda experiment: [grid.order_grid(experiment)],
+        fit="fit-edmd",
         reads=("reproduce.orders", "reproduce.draw_seeds"),
         fixed=("fit-edmd.order", "sample.seed", "sample.grid.seed", "reproduce.draws"),
         instead="it sweeps reproduce.orders over reproduce.draw_seeds; koop sweep sweeps anything",
     ),
-    "eigen": Made(lambda experiment: [recipes.evaluation(experiment, recipes.fit_eigen(experiment))]),
+    "eigen": Made(
+        lambda experiment: [recipes.evaluation(experiment, recipes.predictor(experiment, "fit-eigen"))],
+        fit="fit-eigen",
+        follows=True,
+    ),
     "beside": Made(
         recipes.side_by_side,
+        fit="fit-eigen",
+        follows=True,
         fixed=("fit-edmd.", "baseline."),
-        instead="it sets eigenfunctions beside fixed baselines and EDMD fits; name evaluations to choose others",
+        instead="it sets one predictor beside fixed baselines and EDMD fits; name evaluations to choose others",
     ),
     "improved": Made(
         lambda experiment: [recipes.evaluation(experiment, fit) for fit in recipes.improved(experiment)],
+        fit="fit-eigen",
         reads=("reproduce.budgets",),
         fixed=("fit-eigen.",),
         instead="it sets the paper's reading beside the experiment best-eigen; name evaluations to choose others",
     ),
     "trusted": Made(
         lambda experiment: [recipes.evaluation(experiment, recipes.improved(experiment)[-1])],
+        fit="fit-eigen",
         reads=("reproduce.budgets",),
         fixed=("fit-eigen.", "sample."),
         instead="it draws the experiment best-eigen; name an evaluation to choose another",
     ),
     "modes": Made(
         recipes.mode_sweep,
+        fit="fit-eigen",
         reads=("reproduce.pairs",),
         fixed=("fit-eigen.eigenvalues", "fit-eigen.pairs", "fit-eigen.degree"),
         instead="it sweeps the degree of the lattice and reproduce.pairs",
     ),
     "budgets": Made(
         recipes.budget_sweep,
+        fit="fit-eigen",
         reads=("reproduce.budgets", "reproduce.beside"),
         fixed=("fit-eigen.", "sample."),
         instead="it draws the experiment best-eigen on reproduce.budgets; name evaluations to choose others",
     ),
-    "edmd-fit": Made(lambda experiment: [recipes.fit_edmd(experiment)]),
+    "edmd-fit": Made(lambda experiment: [recipes.predictor(experiment)], fit="fit-edmd", follows=True),
     "surface": Made(lambda experiment: [recipes.sample(experiment.sample("ellipsoid"))]),
     "manoeuvre": Made(
         lambda experiment: [recipes.simulation(experiment, recipes.sample(experiment.sample("manoeuvre")))]

@@ -15,7 +15,7 @@ from koopcli.koopman.predictor import check_horizon
 from koopcli.progress import Progress, within
 from koopcli.records import Meta, Packed
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
-from koopcli.stages.makers import prospect
+from koopcli.stages.makers import outlook
 from koopcli.stages.usable import finished
 from koopcli.vehicles.plants import PLANTS
 
@@ -32,7 +32,7 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
         ("undefined", "predicted stretches are zero in truth and have no relative error"),
     ):
         if figures[name]:
-            context.warn(f"{figures[name]} of {n} {what}; they are left out of the figures")
+            context.warn(f"{figures[name]} of {n} {what}; they are left out of the numbers")
     fitted = predictor.functions > 0  # nobody takes a baseline that knows no inputs for more than it is
     if (
         fitted
@@ -78,14 +78,14 @@ def _at(plant: Meta, name: str) -> Any:
     return None if name == "vehicle" else plant.get(name, plant["vehicle"].get(name))
 
 
-def _describe(figures: Meta) -> str:
+def _describe(figures: Meta, settings: Evaluate) -> str:
     score = figures["rmse"]
     emptiest = 100 * figures["worst_in_emptiest"]
     bound = figures["bound"]
-    trust = f"; {100 * bound['covered']:.1f} % of the errors within their 90 % bounds" if bound else ""
+    trust = f"; {100 * bound['covered']:.1f} % of the errors are within their 90 % bounds" if bound else ""
     return (
         f"RMSE mean {score['mean']:.4g} ± {score['std']:.3g} %, median {score['median']:.4g} %, "
-        f"max {score['max']:.4g} %; of the worst 5 % of states {emptiest:.0f} % lie in the emptiest 5 % of the data"
+        f"max {score['max']:.4g} %; {emptiest:.0f} % of the worst 5 % of states lie in the emptiest 5 % of the data"
         f"{trust}"
     )
 
@@ -99,7 +99,7 @@ def _check(task: Task) -> None:
         )
     steps = task.input("trajectories").settings.steps
     restart = task.settings.restart
-    check_horizon(min(steps, restart or steps), prospect(task.input("predictor")).horizon)
+    check_horizon(min(steps, restart or steps), outlook(task.input("predictor")).horizon)
     shortest = shortest_prediction(steps, restart)
     if task.settings.first > shortest:
         what = "the shortest prediction" if restart else "the test set"
@@ -108,13 +108,13 @@ def _check(task: Task) -> None:
     rows = min(task.settings.chunk, _together(steps))
     if test is not None:
         rows = min(rows, test.settings.trajectories)
-    refuse_beyond_memory("a chunk", 24.0 * rows * prospect(task.input("predictor")).functions, "evaluate.chunk")
+    refuse_beyond_memory("a chunk", 24.0 * rows * outlook(task.input("predictor")).functions, "evaluate.chunk")
 
 
 def _estimate(task: Task) -> Cost:
     test, settings = task.input("trajectories"), task.settings
     n, steps = test.ancestor("sample").settings.trajectories, test.settings.steps
-    about, kinds = prospect(task.input("predictor")), 1 + settings.relift
+    about, kinds = outlook(task.input("predictor")), 1 + settings.relift
     turns = steps * -(-n // min(settings.chunk, _together(steps)))
     seconds = settings.relift * turns * about.a_step
     seconds += n * steps * (6e-9 * (about.functions + 100) + kinds * about.a_state)

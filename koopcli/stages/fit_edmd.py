@@ -20,9 +20,9 @@ from koopcli.koopman.survey import Survey, survey
 from koopcli.koopman.thin_plate import ThinPlate
 from koopcli.koopman.transitions import Transitions
 from koopcli.progress import Progress
-from koopcli.records import Packed
-from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task
-from koopcli.stages.predictors import describe, figures
+from koopcli.records import Meta, Packed
+from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task
+from koopcli.stages.predictors import figures, regression, size
 from koopcli.stages.usable import finished, roles_of
 from koopcli.store.files import size_text
 from koopcli.vehicles.plants import PLANTS
@@ -114,7 +114,7 @@ def _plant(task: Task) -> str:
     return simulation.settings.plant if simulation is not None else "forces"
 
 
-def _prospect(task: Task) -> Prospect:
+def _outlook(task: Task) -> Outlook:
     settings, sample = task.settings, task.find("sample")
     about = "other data"
     if sample is not None:
@@ -125,7 +125,7 @@ def _prospect(task: Task) -> Prospect:
         name = f"bilinear {name}" if settings.terms == "bilinear" else f"bilinear {name}, generator"
     order = settings.order if "order" in OF_BASIS[settings.basis] else None
     rolling = 2.5e-10 * _functions(task) * _terms(task) * ROLLED[settings.terms]
-    return Prospect(_functions(task), None, name, about, order, a_state=rolling)
+    return Outlook(_functions(task), None, name, about, order, a_state=rolling)
 
 
 NAMES = {
@@ -161,6 +161,7 @@ def _check(task: Task) -> None:
         raise InvalidValueError("the terms 'generator' need a constant, which the basis 'states' has not: use 'total'")
     data = [task.input(role) for role in roles_of(dict(task.inputs))]
     _check_alike(data)
+    _check_samples(task, data)
     sample = task.find("sample")
     if sample is not None and isinstance(sample.settings, GridSample) and len(data) == 1:
         _check_grid(task, sample.settings)
@@ -179,6 +180,16 @@ def _check_alike(data: list[Task]) -> None:
     for i, one in enumerate(data):
         if one in data[:i]:
             raise InvalidValueError(f"{one.name} is named twice: its samples would count double, so name it once")
+
+
+def _check_samples(task: Task, data: list[Task]) -> None:
+    """Refuse fewer samples than unknowns, as far as it is known how many there will be."""
+    starts = [one.find("sample") for one in data]
+    if all(start is not None for start in starts):
+        runs = zip(starts, data, strict=True)
+        samples = sum(start.settings.trajectories * one.settings.steps for start, one in runs if start is not None)
+        inputs = len(PLANTS[_plant(task)].inputs)
+        edmd.check_samples(samples, _functions(task), inputs, bilinear=task.settings.terms != "linear")
 
 
 def _check_grid(task: Task, grid: GridSample) -> None:
@@ -209,6 +220,11 @@ def _estimate(task: Task) -> Cost:
     return Cost(lifting + 5e-11 * rows * N * terms + 1.5e-9 * N**3, 8.0 * N * terms)
 
 
+def _describe(figures: Meta, settings: FitEdmd) -> str:
+    found = f"{size(figures)}; {regression(figures)}, condition {figures['condition']:.2g}"
+    return f"{found}, solved by {figures['solved_by']}" if figures["solved_by"] else found
+
+
 STAGE = Stage(
     name="fit-edmd",
     version=4,
@@ -216,9 +232,9 @@ STAGE = Stage(
     run=_run,
     unpack=Predictor.unpack,
     figures=figures,
-    describe=describe,
+    describe=_describe,
     check=_check,
     estimate=_estimate,
     chunk=_chunk,
-    predicts=_prospect,
+    predicts=_outlook,
 )

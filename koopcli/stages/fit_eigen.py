@@ -20,8 +20,8 @@ from koopcli.koopman.rates import Spectrum
 from koopcli.koopman.recurrence import Surface, check_recurrence, check_starts
 from koopcli.koopman.tabulated import Tabulated
 from koopcli.records import FloatArray, Meta, Trajectories
-from koopcli.stages.base import Context, Cost, Inputs, Prospect, Stage, Task, refuse_beyond_memory
-from koopcli.stages.predictors import describe, figures
+from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task, refuse_beyond_memory
+from koopcli.stages.predictors import figures, regression, size
 from koopcli.stages.usable import finished
 from koopcli.vehicles.plants import PLANTS, remembered_plant
 from koopcli.vehicles.symmetry import images
@@ -90,13 +90,12 @@ def _figures(predictor: Predictor) -> Meta:
     }
 
 
-def _describe(figures: Meta) -> str:
-    found = f"{describe(figures)}; {figures['modes']} modes miss {figures['missed']:.3g} % of the data"
+def _describe(figures: Meta, settings: FitEigen) -> str:
+    found = f"{size(figures)}; {figures['modes']} modes represent the data to {figures['missed']:.2g} %"
     if figures["trust"] is not None:
-        found += f"; where data were held back, errors are {figures['trust']['median']:.3g} % in the median"
-    if figures["rank"] < figures["directions"]:
-        found += f"; the errors depend on the cut, which keeps {figures['rank']} directions"
-    return found
+        found += f"; median error in cross-validation {figures['trust']['median']:.2g} %"
+    cut = "rounding" if settings.cut is None else f"{settings.cut:g}"
+    return f"{found}; {regression(figures)} at cut {cut}"
 
 
 def _check_surface(x: FloatArray, trajectories: Trajectories, context: Context) -> None:
@@ -160,7 +159,7 @@ def _check(task: Task) -> None:
         refuse_beyond_memory("the fit", needed + 3 * _estimate(task).bytes, "fit-eigen.centres or sample.count")
 
 
-def _prospect(task: Task) -> Prospect:
+def _outlook(task: Task) -> Outlook:
     simulation, sample = task.find("simulate"), task.find("sample")
     n_x = len(PLANTS[simulation.settings.plant].states) if simulation is not None else 3
     fit = task.settings
@@ -173,12 +172,12 @@ def _prospect(task: Task) -> Prospect:
         found = reading(fit, simulation.settings.steps, simulation.settings.dt)
         eigenfunctions.check_window(simulation.settings.steps, found, simulation.settings.dt)
         horizon = found.horizon
-    return Prospect(copies * _spectrum(fit).count(n_x), horizon, about)
+    return Outlook(copies * _spectrum(fit).count(n_x), horizon, about)
 
 
 def _estimate(task: Task) -> Cost:
     simulation, sample = task.ancestor("simulate").settings, task.ancestor("sample").settings
-    J, functions = sample.trajectories, _prospect(task).functions
+    J, functions = sample.trajectories, _outlook(task).functions
     wide = task.settings.centres if task.settings.boundary == "thin-plate" else 1
     table = 3 * J * (1 + round(task.settings.tabulate / simulation.dt))
     seconds = 0.3 + 2e-9 * J * wide * min(J, wide) + 1e-9 * J * simulation.steps * min(J, wide)
@@ -198,5 +197,5 @@ STAGE = Stage(
     describe=_describe,
     check=_check,
     estimate=_estimate,
-    predicts=_prospect,
+    predicts=_outlook,
 )

@@ -17,12 +17,6 @@ from koopcli.stages import recipes
 from koopcli.stages.base import Task
 from koopcli.stages.effects import why_idle
 
-METHODS: dict[str, Callable[[Experiment], Task]] = {
-    "fit-edmd": recipes.fit_edmd,
-    "fit-eigen": recipes.fit_eigen,
-    "baseline": recipes.baseline,
-}
-
 
 @dataclass(frozen=True)
 class Cell:
@@ -45,20 +39,25 @@ def words(grid: Grid, place: Sequence[int]) -> dict[str, str]:
     return {axis.name: axis.texts[i] for axis, i in zip(grid.axes, place, strict=True) if i >= 0}
 
 
-def cells(grid: Grid, method: str, base: str, check: Callable[[Task], None], progress: Progress = silent) -> list[Cell]:
+def cells(
+    grid: Grid, method: str | None, base: str, check: Callable[[Task], None], progress: Progress = silent
+) -> list[Cell]:
     """The cells of a ``grid`` over the experiment ``base``, those that come to the same only once.
 
-    A value that no experiment takes is refused at once; a cell whose settings do not go together, as ``check`` says, is
-    kept with the reason. Raises ``UsageError`` for a setting that changes nothing in any cell, and what the first cell
-    is refused for where all of them are.
+    ``method``: what makes the predictors, else the fit that each experiment is about. A value that no experiment takes
+    is refused at once; a cell whose settings do not go together, as ``check`` says, is kept with the reason. Raises
+    ``UsageError`` for a setting that changes nothing in any cell, and what the first cell is refused for where all of
+    them are.
     """
+    make: Callable[[Experiment], Task] = recipes.predictor if method is None else recipes.METHODS[method]
+    reads = recipes.CHOSEN if method is None else ()
     found: dict[Task, Cell] = {}
     idle: dict[str, str | None] = {}
     reasons: list[InvalidValueError] = []
     for count, (place, settings) in enumerate(grid.cells(), 1):
         experiment = load_experiment(base, nested(settings))
-        task = recipes.evaluation(experiment, METHODS[method](experiment))
-        why = {name: why_idle(name, experiment, [task]) for name, _ in settings}
+        task = recipes.evaluation(experiment, make(experiment))
+        why = {name: why_idle(name, experiment, [task], reads) for name, _ in settings}
         idle = {name: reason and idle.get(name, reason) for name, reason in why.items()}
         placed = tuple(-1 if why[axis.name] else i for axis, i in zip(grid.axes, place, strict=True))
         if task not in found:

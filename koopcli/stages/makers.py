@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from koopcli.stages import baseline, fit_edmd, fit_eigen
-from koopcli.stages.base import Prospect, Stage, Task
+from koopcli.stages.base import Outlook, Stage, Task
 
 MAKERS: dict[str, Stage] = {module.STAGE.name: module.STAGE for module in (fit_edmd, fit_eigen, baseline)}
 
 LIFTED = tuple(name for name in MAKERS if name != baseline.STAGE.name)  # of predictors with lifted states
 
 
-def prospect(predictor: Task) -> Prospect:
-    """What is known of a predictor before it is made."""
+def outlook(predictor: Task) -> Outlook:
+    """What the predictor of a task will be."""
     predicts = MAKERS[predictor.stage].predicts
     assert predicts is not None
     return predicts(predictor)

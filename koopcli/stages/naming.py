@@ -17,13 +17,13 @@ from koopcli.errors import InvalidValueError
 from koopcli.koopman.rates import lattice_size
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
-from koopcli.stages.makers import prospect
+from koopcli.stages.makers import outlook
 from koopcli.vehicles.plants import PLANTS
 
 
 def names(predictors: Sequence[Task]) -> list[str]:
-    """What predictors are called; those of one name are told apart by the settings in which they differ."""
-    plain = [prospect(task).name for task in predictors]
+    """The labels of predictors. Settings that differ are added where several have one label."""
+    plain = [outlook(task).name for task in predictors]
     found = list(plain)
     for name in dict.fromkeys(plain):
         group = [i for i, other in enumerate(plain) if other == name]
@@ -33,10 +33,10 @@ def names(predictors: Sequence[Task]) -> list[str]:
 
 
 def points(against: str, evaluations: Sequence[Task], experiment: Experiment) -> tuple[Series, ...]:
-    """Points of curves against what is named in ``AXES``, each with the curve it belongs to.
+    """One point per evaluation on the axis ``against``, labelled by its curve.
 
-    Those of one curve differ in that alone, or in what it takes to change it, or they are told apart by what else
-    differs. Raises ``InvalidValueError`` for an evaluation of a predictor that has no such number.
+    Settings that differ otherwise are added to the label. Raises ``InvalidValueError`` for a predictor that has no
+    number on that axis.
     """
     locate, moved = AXES[against]
     found = [locate(task, experiment) for task in evaluations]
@@ -74,7 +74,7 @@ def _beside(evaluation: Task, moved: Sequence[str]) -> dict[str, Any]:
 
 
 def _order(evaluation: Task, experiment: Experiment) -> Series:
-    about = prospect(evaluation.input("predictor"))
+    about = outlook(evaluation.input("predictor"))
     if about.order is None:
         raise InvalidValueError(
             f"the figure takes evaluations of EDMD predictors, which have an order, not of {about.name}"
@@ -100,7 +100,7 @@ def _seconds(evaluation: Task, experiment: Experiment) -> Series:
     sample, steps = simulation.ancestor("sample").settings, simulation.settings
     shown = {name: used_of(there.vehicle, "slips") for name, there in recipes.vehicles(experiment)}
     vehicle = next((f"{name}: " for name, one in shown.items() if one == steps.vehicle), "")
-    fit, about = predictor.settings, prospect(predictor).name
+    fit, about = predictor.settings, outlook(predictor).name
     if isinstance(fit, FitEigen):
         parts = [fit.eigenvalues, fit.lift, *(["world"] if fit.coordinates == "world" else [])]
         parts += ["continued"] if fit.rounds else []

@@ -37,7 +37,7 @@ class Artefact:
 
     @property
     def figures(self) -> dict[str, Any]:
-        """The stage's figures of the content."""
+        """The stage's numbers of the content."""
         return self.stage.figures(self.content)
 
 
@@ -153,9 +153,9 @@ class Pipeline:
     def _obtain(self, task: Task) -> tuple[Record, Any, bool]:
         """Record, content, and whether it was there already."""
         record = self._known(task)
-        found = self._read(task, record)
-        if record is not None and found is not None:
-            return record, found, True
+        content = self._read(task, record)
+        if record is not None and content is not None:
+            return record, content, True
         if task.key is not None:
             self._rebuildable(task, record)
         return self._build(task)
@@ -189,22 +189,22 @@ class Pipeline:
                 "different here in its last bits; run its command afresh"
             )
         with self.store.lock(key, f"{task.stage}/{key[:SHORT]}"):
-            there = self.store.record(task.stage, key)
-            found = self._read(task, there)
-            if there is not None and found is not None:
-                return there, found, True
+            existing = self.store.record(task.stage, key)
+            content = self._read(task, existing)
+            if existing is not None and content is not None:
+                return existing, content, True
             start = time.perf_counter()
             try:
                 made = self._run(task, recipe, inputs)
             except (FileNotFoundError, StorageError):
                 # Where no lock keeps others away, one may have finished it and cleared the chunks that were being read.
-                there = self.store.record(task.stage, key)
-                found = self._read(task, there)
-                if there is None or found is None:
+                existing = self.store.record(task.stage, key)
+                content = self._read(task, existing)
+                if existing is None or content is None:
                     raise
-                return there, found, True
+                return existing, content, True
             seconds = time.perf_counter() - start
-            if there is not None and there.data != made.data:
+            if existing is not None and existing.data != made.data:
                 self.reporter.warn(
                     f"{made.name} came out different in its last bits; what follows from it is made anew"
                 )
@@ -212,7 +212,7 @@ class Pipeline:
         # Go on with what a later process would read: the memory layout of an array moves the last bits of products.
         content = content_of(made, self.store)
         self._records[task] = made
-        self.announce(made.name, f"made in {seconds:.1f} s: {stage.describe(stage.figures(content))}")
+        self.announce(made.name, f"made in {seconds:.1f} s: {stage.describe(stage.figures(content), task.settings)}")
         return made, content, False
 
     def _run(self, task: Task, recipe: Mapping[str, Any], inputs: Mapping[str, tuple[Record, Any]]) -> Record:

@@ -26,7 +26,7 @@ STAGE = Stage(
     run=_run,
     unpack=Drawing.unpack,
     figures=_figures,
-    describe=lambda f: f"{f['figure']}, {f['format']}, {f['bytes']} bytes",
+    describe=lambda f, settings: f"{f['figure']}, {f['format']}, {f['bytes']} bytes",
     check=lambda task: None,
     estimate=lambda task: Cost(1.0, 1e5),
 )

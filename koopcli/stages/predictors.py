@@ -7,7 +7,7 @@ from koopcli.records import Meta
 
 
 def figures(predictor: Predictor) -> Meta:
-    """The figures of a fit that scripts read (`--json`)."""
+    """The numbers of a fit that scripts read (`--json`)."""
     return {
         "functions": predictor.functions,
         "rank": predictor.rank,
@@ -19,10 +19,11 @@ def figures(predictor: Predictor) -> Meta:
     }
 
 
-def describe(figures: Meta) -> str:
-    """The same in a few words."""
-    way = f", by {figures['solved_by']}" if figures["solved_by"] else ""
-    return (
-        f"{figures['functions']} functions, rank {figures['rank']} of {figures['directions']}, "
-        f"condition {figures['condition']:.2g}, spectral radius {figures['spectral_radius']:.6g}{way}"
-    )
+def size(figures: Meta) -> str:
+    """How large the predictor is, and whether it grows, in a few words."""
+    return f"{figures['functions']} functions, spectral radius {figures['spectral_radius']:.6g}"
+
+
+def regression(figures: Meta) -> str:
+    """How well the data determine it."""
+    return f"rank {figures['rank']} of {figures['directions']}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args
@@ -12,7 +12,7 @@ from koopcli.config.experiment import Experiment, load_experiment
 from koopcli.config.pictures import Tyres
 from koopcli.config.sampled import Kind
 from koopcli.config.samples import CUSTOMS, SAMPLED_FOR, GreedySample, GridSample, SampleSettings
-from koopcli.config.settings import OF_BASIS, Baseline, BaselineKind, Eigenvalues, FitEdmd, FitEigen, Simulate
+from koopcli.config.settings import OF_BASIS, Baseline, BaselineKind, Eigenvalues, FitEdmd, FitEigen, FitName, Simulate
 from koopcli.errors import InvalidValueError
 from koopcli.records import Meta
 from koopcli.stages.base import Task
@@ -61,6 +61,21 @@ def baseline(experiment: Experiment, of: Task | None = None) -> Task:
     return Task("baseline", experiment.baseline, (("trajectories", trajectories),))
 
 
+METHODS: dict[str, Callable[[Experiment], Task]] = {
+    "fit-edmd": fit_edmd,
+    "fit-eigen": fit_eigen,
+    "baseline": baseline,
+}
+
+
+CHOSEN = ("experiment.fit",)  # what chooses the method where none is named
+
+
+def predictor(experiment: Experiment, usual: FitName = "fit-edmd") -> Task:
+    """The predictor that the experiment is about, of the ``usual`` fit where it does not say which."""
+    return METHODS[experiment.about.fit or usual](experiment)
+
+
 def test_set(experiment: Experiment, plant: Simulate, **changed: object) -> Task:
     """Test trajectories of ``plant``, with its vehicle and period, from the experiment's test states for it.
 
@@ -89,14 +104,16 @@ def remembered_simulation(about: Meta, dt: float) -> Simulate:
 
 
 def evaluation(experiment: Experiment, of: Task | None = None, on: Task | None = None) -> Task:
-    """The evaluation of a predictor on the trajectories given, or on a test set of its own plant."""
-    predictor = of or fit_edmd(experiment)
-    trajectories = on or test_set(experiment, predictor.ancestor("simulate").settings)
+    """The evaluation of a predictor, else of the experiment's own, on the trajectories given, else on a test set of
+    its plant.
+    """
+    scored = of or predictor(experiment)
+    trajectories = on or test_set(experiment, scored.ancestor("simulate").settings)
     first = experiment.evaluate.first
     if first is None:
         first = CUSTOMS[trajectories.settings.plant].first
     settings = replace(experiment.evaluate, first=first)
-    return Task("evaluate", settings, (("predictor", predictor), ("trajectories", trajectories)))
+    return Task("evaluate", settings, (("predictor", scored), ("trajectories", trajectories)))
 
 
 def with_order(experiment: Experiment, order: int) -> Experiment:
@@ -108,7 +125,8 @@ def order_sweep(experiment: Experiment) -> list[Task]:
     """One evaluation for each order of the experiment's sweep. Raises ``InvalidValueError`` for a basis without any."""
     if "order" not in OF_BASIS[experiment.fit_edmd.basis]:
         raise InvalidValueError(f"the basis '{experiment.fit_edmd.basis}' has no order to sweep: choose polynomials")
-    return [evaluation(with_order(experiment, order)) for order in experiment.reproduce.orders]
+    fits = (fit_edmd(with_order(experiment, order)) for order in experiment.reproduce.orders)
+    return [evaluation(experiment, fit) for fit in fits]
 
 
 def draw_sweep(experiment: Experiment) -> list[Task]:
@@ -173,17 +191,19 @@ def budget_sweep(experiment: Experiment) -> list[Task]:
                 chosen = replace(states, mirror=states.mirror if mirrored else ())
                 fit = replace(best.fit_eigen, mirror=best.fit_eigen.mirror if mirrored else ())
                 training = simulation(best, sample(chosen), plant="slips")
-                predictor = fit_eigen(replace(best, fit_eigen=fit), training)
-                test = test_set(experiment, predictor.ancestor("simulate").settings)
-                found.append(evaluation(experiment, predictor, test))
+                trained = fit_eigen(replace(best, fit_eigen=fit), training)
+                test = test_set(experiment, trained.ancestor("simulate").settings)
+                found.append(evaluation(experiment, trained, test))
     return found
 
 
 def side_by_side(experiment: Experiment) -> list[Task]:
-    """Evaluations on one test set: eigenfunctions, and what they are set beside."""
-    training = simulation(experiment, plant="slips")
-    predictors = [fit_eigen(experiment, training), *beside(experiment, training)]
-    return [evaluation(experiment, predictor) for predictor in predictors]
+    """Evaluations on one test set: the experiment's predictor, of eigenfunctions where it does not say which, and what
+    that is set beside.
+    """
+    main = predictor(experiment, "fit-eigen")
+    others = beside(experiment, main.input("trajectories"))
+    return [evaluation(experiment, one) for one in dict.fromkeys((main, *others))]
 
 
 def tyres(experiment: Experiment) -> tuple[Tyres, ...]:
@@ -214,7 +234,7 @@ def vehicles(experiment: Experiment) -> list[tuple[str, Experiment]]:
 
 
 def beside(experiment: Experiment, training: Task) -> Iterator[Task]:
-    """What any predictor of ``training`` is set beside: baselines that fit nothing, and EDMD of the same data."""
+    """What any predictor of ``training`` is set beside: baselines without any fit, and EDMD of the same data."""
     for kind in get_args(BaselineKind):
         yield baseline(replace(experiment, baseline=Baseline(kind)), training)
     for fit in BESIDE:

@@ -164,7 +164,7 @@ STAGE = Stage(
     run=_run,
     unpack=Sample.unpack,
     figures=_figures,
-    describe=lambda f: f"{f['states']} states, {f['inputs']} input rows, {f['trajectories']} trajectories",
+    describe=lambda f, settings: f"{f['states']} states, {f['inputs']} input rows, {f['trajectories']} trajectories",
     check=_check,
     estimate=_estimate,
 )

@@ -87,7 +87,7 @@ def _figures(trajectories: Trajectories) -> Meta:
     }
 
 
-def _describe(figures: Meta) -> str:
+def _describe(figures: Meta, settings: Simulate) -> str:
     found = f"{figures['trajectories']} trajectories × {figures['steps']} steps of {figures['dt']} s"
     most = figures["substeps"]
     if most["max"] == 0:

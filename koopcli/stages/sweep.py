@@ -17,7 +17,7 @@ def _run(settings: Sweep, inputs: Inputs, context: Context) -> Swept:
     )
 
 
-def _describe(figures: Meta) -> str:
+def _describe(figures: Meta, settings: Sweep) -> str:
     axes = ", ".join(f"{name} ({len(values)})" for name, values in figures["axes"].items())
     best = figures["best"]
     if best is None:
@@ -27,7 +27,7 @@ def _describe(figures: Meta) -> str:
 
 
 def _keep(evaluation: Evaluation) -> Meta:
-    """Its figures: of thousands of evaluations the trajectories would fill the memory."""
+    """Its numbers: of thousands of evaluations the trajectories would fill the memory."""
     return evaluation.figures()
 
 

@@ -1,4 +1,4 @@
-"""What a predictor's scores are worth: beside predictions that fit nothing, and beside the linear one of its data."""
+"""What a predictor's scores are worth, beside baselines without any fit and the linear predictor of its data."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _begins(part: Record, whole: Record) -> bool:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a predictor ``beats`` all it was set beside, by the mean RMSE, and that in words."""
+    """Whether a predictor ``beats`` all baselines by the mean RMSE, and that in words."""
 
     beats: bool
     text: str
@@ -81,8 +81,7 @@ def verdict(figures: Meta, others: Mapping[str, Meta]) -> Verdict:
     mean = _mean(figures)
     better = [name for name, other in others.items() if not mean < _mean(other)]
     if figures["diverged"]:
-        text = f"{figures['diverged']} of its predictions diverge, which no baseline's do"
-        return Verdict(False, f"the predictor cannot be trusted: {text}")
+        return Verdict(False, f"the predictor cannot be trusted: {figures['diverged']} of its predictions diverge")
     if better:
         named = " or ".join(f"the baseline '{NAMES[name]}' ({_mean(others[name]):.4g} %)" for name in better)
         return Verdict(False, f"the predictor, with {mean:.4g} %, does not beat {named}")

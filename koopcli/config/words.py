@@ -1,0 +1,62 @@
+"""Settings by their full names and in the words of a command line, where only their values are known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from koopcli.config.changes import flat
+from koopcli.config.data import data_folder
+from koopcli.config.experiment import DEFAULT_VEHICLE
+from koopcli.config.grids import text_of
+from koopcli.config.plants import used_of
+from koopcli.config.samples import SampleSettings
+from koopcli.config.settings import Simulate
+from koopcli.vehicles.parameters import VehicleParameters, read_vehicle
+
+OF_PLANT = ("force_per", "v_eps", "combined", "brake_width", "dt")  # settings that make another plant of a vehicle
+Words = dict[str, str]
+
+
+def vehicle_words(vehicle: VehicleParameters, plant: str) -> Words | None:
+    """The shipped vehicle that differs least in what the ``plant`` uses of ``vehicle``, with the differences; None
+    where each has something that this one has not.
+    """
+    shipped = {path.stem: read_vehicle(path) for path in (data_folder() / "vehicles").glob("*.toml")}
+    mine = _flat(vehicle, plant)
+    changes = {name: _differing(mine, _flat(other, plant)) for name, other in shipped.items()}
+    sayable = [name for name, changed in changes.items() if None not in changed.values()]
+    if not sayable:
+        return None
+    nearest = min(sayable, key=lambda name: (len(changes[name]), name != DEFAULT_VEHICLE, name))
+    chosen = {} if nearest == DEFAULT_VEHICLE else {"name": nearest}
+    return _words("vehicle", {**chosen, **changes[nearest]})
+
+
+def plant_words(simulate: Simulate) -> Words:
+    """What makes another plant of its vehicle than it is by default."""
+    usual = Simulate(vehicle=simulate.vehicle, plant=simulate.plant).settled()
+    mine, theirs = ({name: getattr(one, name) for name in OF_PLANT} for one in (simulate, usual))
+    return _words("simulate", _differing(mine, theirs))
+
+
+def sample_words(sample: SampleSettings, names: Sequence[str]) -> Words:
+    """Those of the settings ``names`` of a sample that are not at their defaults."""
+    mine, usual = ({name: getattr(one, name) for name in names if hasattr(one, name)} for one in (sample, type(sample)))
+    return _words("sample", _differing(mine, usual))
+
+
+def _flat(vehicle: VehicleParameters, plant: str) -> dict[str, Any]:
+    return dict(flat(asdict(used_of(vehicle, plant))))
+
+
+def _differing(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in mine.items() if name not in theirs or theirs[name] != value}
+
+
+def _words(section: str, changed: Mapping[str, Any]) -> Words:
+    return {
+        f"{section}.{name}": text_of(list(value) if isinstance(value, tuple) else value)
+        for name, value in changed.items()
+    }
