@@ -33,7 +33,7 @@ def _find(run: Run, block: str, **wanted: object) -> Meta | None:
 def _edmd(run: Run, excitation: str) -> tuple[Meta | None, Meta | None]:
     """The polynomials that the paper calls best, and the bilinear generator, on the first training draw."""
     draw, order = edmd_cells.trainings(run.experiment)[0].name, edmd_cells.best_order(run.experiment)
-    label = edmd_cells.prospect_name(run.experiment, edmd_cells.bilinear(run.experiment, "generator"))
+    label = edmd_cells.outlook_name(run.experiment, edmd_cells.bilinear(run.experiment, "generator"))
     return (
         _find(run, edmd_cells.SWEEP, draw=draw, order=order, excitation=excitation),
         _find(run, edmd_cells.OTHERS, draw=draw, label=label, excitation=excitation),

@@ -12,7 +12,7 @@ from koopcli.config.shipped import Fingerprint, fingerprint, used_by
 from koopcli.errors import UnknownNameError
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
-from koopcli.stages.makers import MAKERS, prospect
+from koopcli.stages.makers import MAKERS, outlook
 
 
 def subject(artefacts: Sequence[Task], simulated: Callable[[Task], Simulate]) -> Subject:
@@ -23,7 +23,7 @@ def subject(artefacts: Sequence[Task], simulated: Callable[[Task], Simulate]) ->
     steps = list(dict.fromkeys(step for task in artefacts for step in task.upstream()))
     predictors = [step for step in steps if step.stage in MAKERS]
     vehicles = dict.fromkeys(_simulations(steps, predictors, simulated)) or dict.fromkeys(_samples(steps))
-    return Subject(tuple(vehicles), tuple(prospect(one).name for one in predictors))
+    return Subject(tuple(vehicles), tuple(outlook(one).name for one in predictors))
 
 
 def of_tyres(experiment: Experiment) -> Subject:
