@@ -79,8 +79,8 @@ def _inside(s: EllipsoidSample | GreedySample | BallSample, context: Context) ->
         return sampling.ball(s.seed, s.count) * semi_axes
     if isinstance(s, EllipsoidSample):
         return sampling.shells(sampling.MESHES[s.mesh](s.count), s.shells) * semi_axes
-    plant = SlipInput(s.vehicle, s.v_eps)
-    u = np.zeros((designs.BATCH, s.steps, len(plant.inputs)))
+    plant, steps = SlipInput(s.vehicle, s.v_eps), round(s.usable / s.dt)
+    u = np.zeros((designs.BATCH, min(s.steps, steps), len(plant.inputs)))
 
     def flow(x0: FloatArray) -> FloatArray:
         return simulate(plant.rhs, x0, u[: len(x0)], s.dt, fastest_rate=plant.fastest_rate)
@@ -89,7 +89,7 @@ def _inside(s: EllipsoidSample | GreedySample | BallSample, context: Context) ->
         sampling.ball(s.seed, s.candidates) * semi_axes,
         s.count,
         flow,
-        round(s.usable / s.dt) + 1,
+        steps + 1,
         images(s.mirror, s.vehicle, plant.states.names),
         lambda x: np.asarray(x / semi_axes),
         context.progress,

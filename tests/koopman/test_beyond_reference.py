@@ -51,7 +51,7 @@ def _make(plant, design):
     mirror = images(("left-right",), p, plant.states.names) if design == "images" else []
 
     def flow(x0):
-        return simulate(plant.rhs, x0, np.zeros((len(x0), 100, 4)), 0.01, fastest_rate=plant.fastest_rate)
+        return simulate(plant.rhs, x0, np.zeros((len(x0), 50, 4)), 0.01, fastest_rate=plant.fastest_rate)
 
     x0 = designs.fill(sampling.ball(0, 20_000) * axes, 441, flow, 51, mirror, lambda x: x / axes)
     return with_images(trajectories_of(plant, replace(gamma, states=x0), 100), mirror)

@@ -223,7 +223,7 @@ def test_the_reference_table_at_full_size(full, row):
     settings = dict(row["fit"])
     if settings.get("cut") is None and settings.get("boundary", "thin-plate") == "thin-plate":
         settings["cut"] = 1e-14
-    figures = evaluate(eigen_fit(training, **settings), test, slice(None), 0).figures()
+    figures = evaluate(eigen_fit(training, **settings), test, slice(None), 0, relift=False).figures()
     mean, std, median = row["rmse"]
     tolerance = row.get("a", 0) + row.get("r", 0) * mean + 0.05  # half the last digit of most
     assert figures["rmse"]["mean"] == pytest.approx(mean, abs=max(tolerance, 0.5 if mean == int(mean) else 0))
@@ -238,7 +238,7 @@ def test_the_figure_the_paper_prints(full):
     predictor = eigen_fit(full("ctu-2020"), **{"cut": 1e-14})
     assert predictor.functions == 4410
     assert predictor.A.rates.real[1:4] == pytest.approx(REFERENCE["rates"]["ctu-2020"], abs=5e-4)
-    figures = evaluate(predictor, full("ctu-2020", seed=0), slice(None), 0).figures()
+    figures = evaluate(predictor, full("ctu-2020", seed=0), slice(None), 0, relift=False).figures()
     assert figures["rmse"]["mean"] == pytest.approx(22.95, abs=0.1)
     assert figures["rmse"]["std"] == pytest.approx(13.73, abs=0.1)
     assert figures["outside"] == 41
@@ -249,7 +249,7 @@ def test_where_the_errors_are(full, vehicle):
     predictor = eigen_fit(full(vehicle), **{"boundary": "optimal", "cut": 1e-10})
     found = dmd_rates(full(vehicle).x, 0.01)
     assert np.sort(found.real) == pytest.approx(np.sort(REFERENCE["rates"][vehicle]), abs=1e-3)
-    figures = evaluate(predictor, full(vehicle, seed=0), slice(None), 0).figures()
+    figures = evaluate(predictor, full(vehicle, seed=0), slice(None), 0, relift=False).figures()
     assert figures["worst_in_emptiest"] == pytest.approx(REFERENCE["worst_in_emptiest"][vehicle], abs=0.035)
     if vehicle == "ctu-2020":
         assert figures["start_error"]["mean"] == pytest.approx(REFERENCE["start_error"], rel=0.02)
@@ -265,7 +265,7 @@ def test_the_cut_decides_the_figure(full, rank):
     cut = 0.9 * singular[kept - 1] / singular[0]
     predictor = eigen_fit(training, **{"boundary": "optimal", "cut": cut})
     assert predictor.rank == kept
-    figures = evaluate(predictor, full("ctu-2020", seed=0), slice(None), 0).figures()
+    figures = evaluate(predictor, full("ctu-2020", seed=0), slice(None), 0, relift=False).figures()
     assert figures["rmse"]["mean"] == pytest.approx(REFERENCE["ranks"][rank], rel=0.01)
 
 
@@ -280,10 +280,12 @@ def test_the_baselines(full, vehicle):
     coverage = edmd.coverage(training)
     for kind in FORECASTS:
         one = Forecast(kind, 0.01, coverage, training.state_channels, training.input_channels, about)
-        found = evaluate(one, test, slice(None), 0).figures()["rmse"]["mean"]
+        found = evaluate(one, test, slice(None), 0, relift=False).figures()["rmse"]["mean"]
         assert found == pytest.approx(expected[kind], abs=0.6)
     dmd = edmd.fit(training, edmd.basis_from_data(training, Choice("states", 1)))
-    assert evaluate(dmd, test, slice(None), 0).figures()["rmse"]["mean"] == pytest.approx(expected["dmd"], abs=0.6)
+    assert evaluate(dmd, test, slice(None), 0, relift=False).figures()["rmse"]["mean"] == pytest.approx(
+        expected["dmd"], abs=0.6
+    )
 
 
 @pytest.mark.parametrize(
