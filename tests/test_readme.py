@@ -25,7 +25,7 @@ SMALL = {  # what makes a command quick, by the word that follows `koop`
 }
 
 
-def sessions():
+def _sessions():
     """The commands of each block of the README with the lines shown under them."""
     for block in re.findall(r"```console\n(.*?)```", README, re.DOTALL):
         session = []
@@ -35,6 +35,9 @@ def sessions():
             elif line != "…":
                 session[-1][1].append(line)
         yield session
+
+
+SESSIONS = list(_sessions())
 
 
 def masked(text, *, numbers):
@@ -62,13 +65,13 @@ def my_car(folder):
     shutil.copy(data_folder() / "vehicles" / "bmw-320i.toml", folder / "my-car.toml")
 
 
-@pytest.mark.parametrize("session", sessions(), ids=lambda session: session[0][0])
+@pytest.mark.parametrize("session", SESSIONS, ids=lambda session: session[0][0])
 def test_commands_print_what_is_shown(koop, stocked, my_car, session):
     run(koop, session, small=True)
 
 
 @pytest.mark.slow  # minutes: every command at full size
-@pytest.mark.parametrize("session", sessions(), ids=lambda session: session[0][0])
+@pytest.mark.parametrize("session", SESSIONS, ids=lambda session: session[0][0])
 def test_numbers_are_those_of_full_size(koop, my_car, session):
     run(koop, session, small=False)
 
