@@ -90,8 +90,11 @@ def test_the_figures_of_the_report_are_those_of_evaluate(koop, stocked):
     "changes",
     [
         (),
-        ("fit-edmd.basis=total", "sample.levels=[1,50]"),
-        ('reproduce.draws=["even"]', 'reproduce.excitations=["held"]', "fit-edmd.centres=9", "test.amplitude=500"),
+        pytest.param(("fit-edmd.basis=total", "sample.levels=[1,50]"), marks=pytest.mark.slow),
+        pytest.param(
+            ('reproduce.draws=["even"]', 'reproduce.excitations=["held"]', "fit-edmd.centres=9", "test.amplitude=500"),
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_the_commands_of_the_claims_work_and_show_what_they_claim(koop, folder, stocked, changes):
