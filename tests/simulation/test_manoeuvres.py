@@ -38,7 +38,10 @@ def lateral(x):
     return np.gradient(x[:, 1], 0.01) + x[:, 2] * x[:, 0]
 
 
-@pytest.mark.parametrize("name", MANOEUVRES)
+@pytest.mark.parametrize(
+    "name",  # a car that comes to a standstill needs hundreds of substeps
+    [pytest.param(name, marks=pytest.mark.slow) if name == "brake-in-turn" else name for name in MANOEUVRES],
+)
 def test_every_manoeuvre_has_a_source_and_a_mirror_image(name):
     assert MANOEUVRES[name].source
     assert MANOEUVRES[name].about
@@ -76,6 +79,7 @@ def test_sine_with_dwell_is_the_standards():
     assert not u[:, [1, 2, 4, 5]].any()  # it coasts
 
 
+@pytest.mark.slow
 def test_brake_in_turn_brakes_to_a_standstill():
     x, u, _ = drive("brake-in-turn")
     assert lateral(x)[290] == pytest.approx(5.0, rel=0.08)
