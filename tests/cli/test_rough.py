@@ -15,11 +15,11 @@ from pathlib import Path
 import pytest
 
 from koopcli.store import Store
-from tests.cli.test_processes import KOOP, LONG, start, wait_for_chunks
+from tests.cli.test_processes import KOOP, LONG, PATIENCE, start, wait_for_chunks
 from tests.conftest import read_all
 
-WIDE = ["--set", "simulate.chunk=2000", "--set", "evaluate.chunk=100"]  # 120 chunks of one, 40 of the other
-SHARED = ["evaluate", "--experiment", "../tiny.toml", "--count", "4000", "--steps", "60", *WIDE]
+WIDE = ["--set", "simulate.chunk=600", "--set", "evaluate.chunk=50"]  # 60 chunks of one, 24 of the other
+SHARED = ["evaluate", "--experiment", "../tiny.toml", "--count", "1200", "--steps", "30", *WIDE]
 
 
 def objects(root: Path) -> dict[str, str]:
@@ -35,12 +35,14 @@ def uninterrupted(tmp_path_factory) -> dict[str, str]:
     (folder / "tiny.toml").write_text(TINY)
     (folder / "work").mkdir()
     process = start(folder / "work", *SHARED)
-    process.communicate(timeout=120)
+    process.communicate(timeout=PATIENCE)
     assert process.returncode == 0
     return objects(folder / "work" / "artefacts")
 
 
-@pytest.mark.parametrize("workers", [1, 2, 4])
+@pytest.mark.parametrize(
+    "workers", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(4, marks=pytest.mark.slow)]
+)
 def test_killed_and_run_again_it_ends_the_same_whatever_the_workers(folder, uninterrupted, workers):
     rng = random.Random(workers)
     for there in (1, 4, 9, 20):  # the later ones are of later stages, or the process is done before
@@ -48,34 +50,36 @@ def test_killed_and_run_again_it_ends_the_same_whatever_the_workers(folder, unin
         while chunks(folder) < there + rng.randrange(3) and process.poll() is None:
             time.sleep(0.002)
         process.kill()
-        process.communicate(timeout=60)
+        process.communicate(timeout=PATIENCE)
     process = start(folder, *SHARED, "--workers", str(workers))
-    _, err = process.communicate(timeout=120)
+    _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0
     assert "chunks were already there" in err
     assert objects(folder / "artefacts") == uninterrupted
     assert not list((folder / "artefacts" / "partial").iterdir())
 
 
+@pytest.mark.slow
 def test_workers_end_with_the_process_that_began_them(folder):
     process = start(folder, *SHARED, "--workers", "2")
     wait_for_chunks(folder, 1)
     workers = children(process.pid)
     assert len(workers) >= 2
     process.kill()
-    process.communicate(timeout=60)
+    process.communicate(timeout=PATIENCE)
     until = time.monotonic() + 20
     while any(map(alive, workers)) and time.monotonic() < until:
         time.sleep(0.05)
     assert not any(map(alive, workers))
 
 
+@pytest.mark.slow
 def test_ctrl_c_in_a_terminal_stops_workers_without_a_word_of_theirs(folder):
     process = start(folder, *SHARED, "--workers", "2", start_new_session=True)
     wait_for_chunks(folder, 1)
     workers = children(process.pid)
     os.killpg(process.pid, signal.SIGINT)
-    _, err = process.communicate(timeout=60)
+    _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert "Traceback" not in err
     assert err.splitlines()[-1].endswith("run the same command again to resume")
@@ -102,9 +106,10 @@ def alive(pid: int) -> bool:
         return False
 
 
+@pytest.mark.slow
 def test_eight_processes_make_one_artefact_once(folder):
     several = [start(folder, "simulate", "--experiment", "../tiny.toml") for _ in range(8)]
-    done = [process.communicate(timeout=120) for process in several]
+    done = [process.communicate(timeout=PATIENCE) for process in several]
     assert [process.returncode for process in several] == [0] * 8
     assert len({out for out, _ in done}) == 1
     made = [line.split()[0] for _, err in done for line in err.splitlines() if "made in" in line]
@@ -112,6 +117,7 @@ def test_eight_processes_make_one_artefact_once(folder):
     assert read_all(folder / "artefacts") == 2
 
 
+@pytest.mark.slow
 def test_another_takes_over_from_one_that_is_killed(folder):
     first = start(folder, *LONG)
     wait_for_chunks(folder, 3)
@@ -119,8 +125,8 @@ def test_another_takes_over_from_one_that_is_killed(folder):
     while "waiting for another process" not in second.stderr.readline():
         assert second.poll() is None
     first.kill()
-    first.communicate(timeout=60)
-    out, err = second.communicate(timeout=120)
+    first.communicate(timeout=PATIENCE)
+    out, err = second.communicate(timeout=PATIENCE)
     assert second.returncode == 0
     assert "chunks were already there" in err
     assert Store(folder / "artefacts").find(out.strip())
@@ -134,18 +140,20 @@ WITHOUT_LOCKS = (
 )
 
 
+@pytest.mark.slow
 def test_two_processes_without_locks_end_the_same(folder, uninterrupted):
     command = [sys.executable, "-c", WITHOUT_LOCKS, *SHARED]
     both = [
         subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         for _ in range(2)
     ]
-    done = [process.communicate(timeout=120) for process in both]
+    done = [process.communicate(timeout=PATIENCE) for process in both]
     assert [process.returncode for process in both] == [0, 0], done
     assert all("this file system has no locks" in err for _, err in done)
     assert objects(folder / "artefacts") == uninterrupted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [3_000, 400_000])
 def test_a_limit_on_the_size_of_files(folder, limit):
     """Struck in a small file, and in one that does not go through memory."""
@@ -169,7 +177,7 @@ def test_a_limit_on_the_size_of_files(folder, limit):
     assert "Traceback" not in done.stderr
     read_all(folder / "artefacts")
     again = start(folder, *SHARED)
-    assert again.communicate(timeout=120)[1]
+    assert again.communicate(timeout=PATIENCE)[1]
     assert again.returncode == 0
 
 
@@ -187,6 +195,7 @@ def small_disk(tmp_path) -> Iterator[Path]:
     subprocess.run(["umount", "-l", str(disk)], check=True)
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_and_one_that_is_read_only(folder, small_disk):
     store = ["--store", str(small_disk / "store")]
     code, err = run(folder, *SHARED, *store)
@@ -224,6 +233,7 @@ def free(path: Path) -> int:
     return about.f_bavail * about.f_frsize
 
 
+@pytest.mark.slow
 def test_a_clock_ten_years_off_changes_nothing(folder):
     assert run(folder, "evaluate", "--experiment", "../tiny.toml")[0] == 0
     store = folder / "artefacts"

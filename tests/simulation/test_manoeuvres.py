@@ -89,6 +89,7 @@ def test_brake_in_turn_brakes_to_a_standstill():
     assert u[-1, 0] == u[200, 0]
 
 
+@pytest.mark.slow
 def test_drift_entry_breaks_the_rear_away():
     x, _, _ = drive("drift-entry", "ctu-2020")
     sliding = np.abs(np.rad2deg(np.arctan2(x[:, 1], x[:, 0])))
