@@ -37,8 +37,8 @@ def ls(
         typer.Option(
             "--stale",
             help="List only artefacts that this koop would not make again under the same name, and why: their stage, "
-            "their settings or what they were made from have changed. Below them stand those that other code made under "
-            "names that this koop gives too.",
+            "their settings or what they were made from have changed. Below them stand those that other code made "
+            "under names that this koop gives too.",
         ),
     ] = False,
     store: StoreOption = None,

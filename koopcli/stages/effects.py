@@ -20,6 +20,8 @@ def why_idle(name: str, experiment: Experiment, tasks: Sequence[Task], reads: Se
         return None
     section, _, key = name.partition(".")
     behind = [step for task in tasks for step in task.upstream()]
+    if section == "experiment":
+        return _of_nothing(tasks) if tasks and tasks[0].stage == "plot" else "what makes the predictors is named"
     if section in ("sample", "test"):
         return _idle_sample(section, key, tasks, behind)
     stages = {step.stage for step in behind}
