@@ -101,7 +101,9 @@ def advise(case: Case) -> Advice:
     if case.elsewhere:
         return Advice("the test trajectories are of another vehicle or plant than the predictor", own_test=True)
     if case.edmd and case.tested and not case.trained:
-        return Advice("no input moves in the training data, so the predictor knows nothing of inputs: sample some")
+        return Advice(
+            "no input moves in the training data, so the predictor knows nothing of them: sample some that do"
+        )
     why = next(text for holds, text in REASONS if holds(case))
     return Advice(why, PAGES[case.plant], RULES[case.plant](case))
 

@@ -26,15 +26,15 @@ def why_idle(name: str, experiment: Experiment, tasks: Sequence[Task], reads: Se
     if ELSEWHERE.get(key) == section and any(hasattr(step.settings, key) for step in behind if step.stage == "sample"):
         return None
     if tasks and section != "vehicle" and section not in stages - {"plot"}:  # a figure reads what it is told of
-        return _of_nothing(tasks)
+        return _of_nothing(tasks, "the fit is named" if section == "experiment" else "nothing is made by it")
     if section in ("vehicle", "simulate"):
         return _idle_in_plants(name, key, tasks, behind)
     return _idle_in_fit(section, key, experiment)
 
 
-def _of_nothing(tasks: Sequence[Task]) -> str:
+def _of_nothing(tasks: Sequence[Task], otherwise: str = "nothing is made by it") -> str:
     drawn = tasks[0].stage == "plot"
-    return f"the figure '{tasks[0].settings.figure}' draws nothing of it" if drawn else "nothing is made by it"
+    return f"the figure '{tasks[0].settings.figure}' draws nothing of it" if drawn else otherwise
 
 
 def _idle_sample(section: str, key: str, tasks: Sequence[Task], behind: Sequence[Task]) -> str | None:

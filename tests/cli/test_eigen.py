@@ -135,7 +135,7 @@ def test_repeated_initial_states_are_said(koop):
 
 
 def test_the_cut_is_said(koop):
-    assert "the errors depend on the cut, which keeps 26 directions" in koop("fit-eigen", "--cut", "1e-4").err
+    assert "rank 26 of 200 at cut 0.0001" in koop("fit-eigen", "--cut", "1e-4").err
     kept = figures(koop("fit-eigen", "--boundary", "optimal", "--cut", "1e-6", "--json"))
     assert kept["rank"] < kept["directions"] == 10
 

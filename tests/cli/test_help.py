@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -7,7 +8,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from koopcli.cli.app import app
+from koopcli.__main__ import main
+from koopcli.cli.app import FIRST, app
 from koopcli.cli.reference import reference
 
 ROOT = Path(__file__).parents[2]
@@ -32,6 +34,24 @@ def test_every_command_has_help_with_an_example_and_every_option_says_what_it_is
 def test_the_command_reference_is_up_to_date():
     written = (ROOT / "docs" / "cli.md").read_text()
     assert written == reference(), "run: make docs"
+
+
+@pytest.mark.parametrize("args", [[], ["--help"]])
+def test_help_begins_with_commands(capsys, args):
+    main(args)
+    shown = capsys.readouterr().out
+    for command, gives in FIRST:
+        assert command in shown
+        assert gives in shown
+        assert shown.index(command) < shown.index("Options")
+
+
+@pytest.mark.parametrize("command", [command for command, _ in FIRST[1:]])  # the tests of reproduce run the first
+def test_the_first_commands_run_as_printed(folder, capsys, command):
+    _, *words = shlex.split(command)
+    assert main([*words, *([] if words == ["ls"] else ["--dry-run"])]) == 0
+    capsys.readouterr()
+    assert not (folder / "artefacts").exists()
 
 
 def test_the_tour_and_the_store_know_every_command():

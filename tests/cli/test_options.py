@@ -38,7 +38,7 @@ def changes_of(monkeypatch):
     def of(command, **given):
         found.clear()
         with suppress(KoopError):
-            command(**given)
+            command(**given, **({"context": None} if command is evaluating.evaluate else {}))
         return dict(found)
 
     monkeypatch.setattr(invocation, "load_experiment", spy)

@@ -14,7 +14,7 @@ FEW = ("--set", "sample.count=30", "--set", "sample.steps=20")
 
 
 def test_from_a_sample_to_a_verdict(koop):
-    """Both fits run on five states, torques and steer, beside what fits nothing."""
+    """Both fits run on five states, torques and steer, beside baselines."""
     few_tests = ("--set", "test.count=20", "--set", "test.steps=10")
     trajectories = koop("simulate", "--plant", "wheels", *FEW)
     assert "substeps at most: 2 to" in trajectories.err
@@ -175,6 +175,6 @@ def test_vehicle_check_of_a_good_file(koop, folder):
     (folder / "mine.toml").write_text(text)
     checked = koop("vehicle", "check", "mine.toml", tiny=False)
     assert checked.code == 0
-    assert "mine.toml can be used, for the plants forces, slips, wheels; nothing unusual about it" in checked.err
+    assert "mine.toml can be used with the plants forces, slips, wheels; nothing about it is unusual" in checked.err
     (folder / "mine.toml").write_text(text.replace("value = 2688.0", "value = 26880.0"))
     assert "is its unit right?" in koop("vehicle", "check", "mine.toml", tiny=False).err

@@ -12,7 +12,7 @@ from koopcli.config.data import data_folder
 from koopcli.config.experiment import load_experiment
 from koopcli.config.pictures import PlotOptions
 from koopcli.config.samples import SAMPLES, BoxSample, GridSample
-from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
+from koopcli.config.settings import About, Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError, UsageError
 from koopcli.figures.registry import FIGURES
 from koopcli.koopman.baselines import FORECASTS
@@ -23,6 +23,7 @@ from koopcli.koopman.rates import RATES
 from koopcli.koopman.thin_plate import PLACEMENTS
 from koopcli.simulation.manoeuvres import MANOEUVRES
 from koopcli.simulation.sampling import DRAWS, MESHES
+from koopcli.stages.makers import LIFTED
 from koopcli.vehicles.axles import COMBINED
 from koopcli.vehicles.options import CUSTOMARY
 from koopcli.vehicles.plants import PLANTS
@@ -56,6 +57,7 @@ PAPER = tomllib.loads((data_folder() / "experiments" / "paper.toml").read_text()
         (settings.Coordinates, FRAMES),
         (sampled.Mirror, MIRRORS),
         (settings.BaselineKind, FORECASTS),
+        (settings.FitName, LIFTED),
     ],
 )
 def test_option_names_are_the_registries(literal, registry):
@@ -82,6 +84,7 @@ def test_the_paper_file_writes_out_every_default():
     assert loaded.sample("drive") == SAMPLES["drive"](**rolling)
     assert loaded.test("drive-test", vehicle) == SAMPLES["drive-test"](**rolling)
     assert loaded.sample("manoeuvre") == SAMPLES["manoeuvre"](vehicle=vehicle, dt=0.01).settled()
+    assert loaded.about == About()
     assert loaded.fit_edmd == FitEdmd()
     assert loaded.fit_eigen == FitEigen()
     assert loaded.evaluate == Evaluate()
@@ -110,7 +113,7 @@ def test_the_paper_file_writes_out_every_default():
 
 
 def test_every_setting_has_a_help_text():
-    for cls in (*SAMPLES.values(), FitEdmd, FitEigen, Baseline, Evaluate, PlotOptions, Simulate, Reproduce):
+    for cls in (*SAMPLES.values(), About, FitEdmd, FitEigen, Baseline, Evaluate, PlotOptions, Simulate, Reproduce):
         hints = get_type_hints(cls)
         for f in fields(cls):
             if f.name not in ("kind", *samples.ELSEWHERE) or (cls is Simulate and f.name != "vehicle"):

@@ -1,0 +1,67 @@
+"""Which fit an experiment is about, and what follows it."""
+
+from __future__ import annotations
+
+import pytest
+
+from koopcli.config.changes import parse_set
+from koopcli.config.experiment import load_experiment
+from koopcli.config.grids import parse_grid
+from koopcli.errors import InvalidValueError
+from koopcli.figures.registry import FIGURES
+from koopcli.stages import recipes
+from koopcli.stages.drawn import MADE
+from koopcli.stages.grid import cells
+
+FITS = ("fit-edmd", "fit-eigen")
+ABOUT = {None: "paper", "fit-edmd": "best-edmd", "fit-eigen": "best-eigen"}
+
+
+def about(fit):
+    return load_experiment("paper", parse_set([f"experiment.fit={fit}"]))
+
+
+def test_the_best_experiments_say_which_fit_they_are_about():
+    assert {fit: load_experiment(name, {}).about.fit for fit, name in ABOUT.items()} == {fit: fit for fit in ABOUT}
+    found = recipes.evaluation(load_experiment("best-eigen", {})).input("predictor")
+    assert (found.stage, found.settings.lift) == ("fit-eigen", "polyharmonic")
+    assert found.ancestor("sample").settings.kind == "greedy"
+    found = recipes.evaluation(load_experiment("best-edmd", {})).input("predictor")
+    assert (found.stage, found.settings.terms) == ("fit-edmd", "generator")
+    assert recipes.evaluation(load_experiment("paper", {})).input("predictor").stage == "fit-edmd"
+
+
+@pytest.mark.parametrize("fit", FITS)
+def test_what_an_experiment_is_about_changes_no_recipe(fit):
+    paper = load_experiment("paper", {})
+    assert recipes.fit_edmd(about(fit)) == recipes.fit_edmd(paper)
+    assert recipes.fit_eigen(about(fit)) == recipes.fit_eigen(paper)
+    assert recipes.order_sweep(load_experiment("paper", {})) == recipes.order_sweep(about(fit))
+
+
+@pytest.mark.parametrize("name", dict.fromkeys(kind.made for kind in FIGURES.values()))
+def test_a_figure_follows_the_experiment_or_is_for_one_fit(name):
+    """One that makes no fit follows nothing; one that is for a fit says so where the experiment is about the other."""
+    made = MADE[name]
+    if made.fit is None:
+        assert all(made.tasks(about(fit)) == made.tasks(load_experiment("paper", {})) for fit in FITS)
+        return
+    for fit in FITS:
+        if made.follows:
+            assert made.tasks(about(fit))[0].find(fit) is not None
+        elif fit != made.fit:
+            with pytest.raises(InvalidValueError, match=f"experiment.fit={made.fit}"):
+                made.tasks(about(fit))
+    assert made.tasks(about(made.fit)) == made.tasks(load_experiment("paper", {}))
+
+
+def test_a_sweep_follows_the_experiment_unless_a_method_is_named():
+    def stages(method, base, *sets):
+        found = cells(parse_grid(sets), method, base, lambda task: None)
+        return [cell.task.input("predictor").stage for cell in found]
+
+    seeds = "test.seed=1,2"
+    assert stages(None, "paper", seeds) == ["fit-edmd", "fit-edmd"]
+    assert stages(None, "best-eigen", seeds) == ["fit-eigen", "fit-eigen"]
+    assert stages("fit-edmd", "best-eigen", seeds) == ["fit-edmd", "fit-edmd"]
+    assert stages(None, "paper", "experiment.fit=fit-edmd,fit-eigen") == list(FITS)
