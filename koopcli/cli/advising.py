@@ -62,7 +62,7 @@ class Typed:
         for parameter in context.command.params:
             name = str(parameter.name)
             value = context.params.get(name)
-            if name not in OUTPUTS and value not in (None, False, [], parameter.default):
+            if name not in OUTPUTS and value not in (None, False, [], (), parameter.default):
                 option = [] if parameter.param_type_name == "argument" else parameter.opts[:1]
                 values = value if isinstance(value, list) else [value]
                 found[name] = tuple(word for one in values for word in (*option, str(one)))

@@ -36,7 +36,7 @@ def test_from_nothing_to_a_predictor_that_knows_its_errors(koop, folder):
     assert found["rmse"]["mean"] < 15
     assert found["beats_baselines"] is True
     assert 0.7 < found["bound"]["covered"] <= 1
-    assert "of the errors within their 90 % bounds" in scored.err
+    assert "of the errors are within their 90 % bounds" in scored.err
     assert f"{found['outside']} of 200 test states lie outside the data" in scored.err
     assert "predictions from there continue the local spline" in scored.err
     header, *rows = koop("show", found["name"], "--csv").out.splitlines()
