@@ -40,10 +40,10 @@ def advice(typed: Typed, call: Invocation, evaluation: Task, figures: Meta) -> s
     if not found.page:
         return f"{found.why}."
     if found.better is None:
-        return f"{found.why}; no setting of koop is known to beat the baseline here: see {found.page}"
+        return f"{found.why}. No setting of koop is known to beat the baseline here: see {found.page}"
     command = _short(typed, call, evaluation, found.better) or _nested(typed, call, evaluation, found.better)
     if command is None:
-        return f"{found.why}: see {found.page} for what does better"
+        return f"{found.why}; see {found.page} for what does better"
     gain = found.better.gain
     measured = f"measured on {gain.vehicle} to turn {gain.before:.3g} % into {gain.after:.3g} %"
     return f"{found.why}. Try this, {measured}: {command}"
@@ -64,7 +64,7 @@ class Typed:
             value = context.params.get(name)
             if name not in OUTPUTS and value not in (None, False, [], (), parameter.default):
                 option = [] if parameter.param_type_name == "argument" else parameter.opts[:1]
-                values = value if isinstance(value, list) else [value]
+                values = value if isinstance(value, (list, tuple)) else [value]
                 found[name] = tuple(word for one in values for word in (*option, str(one)))
         return cls(found)
 
