@@ -97,7 +97,7 @@ def alone(tmp_path_factory) -> dict[str, str]:
     return objects(store)
 
 
-@pytest.mark.parametrize("count", [2, 4])
+@pytest.mark.parametrize("count", [2, pytest.param(4, marks=pytest.mark.slow)])
 def test_chunks_made_by_workers_are_the_same_to_the_last_bit(tmp_path, alone, count):
     store, heard = Store(tmp_path), Listener()
     with Workers(count) as workers:
@@ -161,8 +161,14 @@ def test_simulations_are_resumed_chunk_by_chunk(tmp_path, alone, monkeypatch):
 FIT = ["sample.kind=box", "sample.count=300", "sample.steps=5", "fit-edmd.order=2", "fit-edmd.chunk=160"]
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-@pytest.mark.parametrize("done", [0, 4, 13, 17])
+@pytest.mark.parametrize(
+    ("workers", "done"),
+    [
+        *((1, done) for done in (0, 4, 13, 17)),
+        (2, 4),
+        *(pytest.param(2, n, marks=pytest.mark.slow) for n in (0, 13, 17)),
+    ],
+)
 def test_fits_are_resumed_chunk_by_chunk_in_every_pass(tmp_path, monkeypatch, done, workers):
     """Ten chunks look at the samples, ten sum over them; between them lies what the sums work with."""
     task = recipes.fit_edmd(load_experiment("paper", parse_set(FIT)))
@@ -180,6 +186,7 @@ def test_fits_are_resumed_chunk_by_chunk_in_every_pass(tmp_path, monkeypatch, do
     assert not list((store.root / "partial").glob("*"))
 
 
+@pytest.mark.slow
 def test_one_long_trajectory_is_shared_as_well_as_many(tmp_path):
     """A chunk may begin and end inside a trajectory."""
     long = ["sample.kind=box", "sample.count=2", "sample.steps=700", "fit-edmd.order=1", "fit-edmd.chunk=100"]
@@ -205,7 +212,7 @@ def test_damage_to_what_chunks_work_with_is_found(tmp_path, monkeypatch):
     assert made.object == whole.object
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_sums_that_were_given_other_directions_are_not_gone_on_with(tmp_path, monkeypatch, workers):
     """Where another machine goes on, its directions of the inputs may be others, as good: nothing is mixed."""
     task = recipes.fit_edmd(load_experiment("paper", parse_set(FIT)))
