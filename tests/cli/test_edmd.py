@@ -17,13 +17,17 @@ from tests.cli.test_errors import one_line
     ("options", "functions"),
     [
         (["--order", "2"], 27),
-        (["--basis", "total", "--order", "3"], 20),
-        (["--basis", "anisotropic", "--order", "4", "--terms", "bilinear"], 15),
+        pytest.param(["--basis", "total", "--order", "3"], 20, marks=pytest.mark.slow),
+        pytest.param(["--basis", "anisotropic", "--order", "4", "--terms", "bilinear"], 15, marks=pytest.mark.slow),
         (["--basis", "anisotropic", "--order", "3", "--degree-velocity", "2", "--terms", "generator"], 24),
         (["--basis", "thin-plate", "--centres", "12"], 16),
-        (["--basis", "thin-plate", "--placement", "drawn", "--terms", "bilinear", "--ridge", "1e-6"], 24),
+        pytest.param(
+            ["--basis", "thin-plate", "--placement", "drawn", "--terms", "bilinear", "--ridge", "1e-6"],
+            24,
+            marks=pytest.mark.slow,
+        ),
         (["--basis", "states"], 3),
-        (["--order", "2", "--solver", "cholesky-monomials"], 27),
+        pytest.param(["--order", "2", "--solver", "cholesky-monomials"], 27, marks=pytest.mark.slow),
     ],
 )
 def test_every_way_to_fit_is_stored_and_scored(koop, folder, options, functions):

@@ -14,6 +14,9 @@ from koopcli.simulation.manoeuvres import MANOEUVRES, Driver
 from koopcli.vehicles.single_track import TorqueInput
 
 
+LONG = ("brake-in-turn", "double-lane-change")
+
+
 @cache
 def both_ways(name, vehicle="bmw-320i"):
     """States (2, samples, 5) and inputs (2, steps, 6) of a manoeuvre and its mirror image, driven once."""
@@ -39,8 +42,8 @@ def lateral(x):
 
 
 @pytest.mark.parametrize(
-    "name",  # a car that comes to a standstill needs hundreds of substeps
-    [pytest.param(name, marks=pytest.mark.slow) if name == "brake-in-turn" else name for name in MANOEUVRES],
+    "name",  # a car that comes to a standstill needs hundreds of substeps, a lane change is long
+    [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in MANOEUVRES],
 )
 def test_every_manoeuvre_has_a_source_and_a_mirror_image(name):
     assert MANOEUVRES[name].source
