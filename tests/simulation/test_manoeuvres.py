@@ -13,7 +13,6 @@ from koopcli.simulation.integrate import simulate
 from koopcli.simulation.manoeuvres import MANOEUVRES, Driver
 from koopcli.vehicles.single_track import TorqueInput
 
-
 LONG = ("brake-in-turn", "double-lane-change")
 
 
