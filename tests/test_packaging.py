@@ -39,5 +39,7 @@ def test_links_of_the_readme_lead_to_the_project_s_address_once_it_has_one(tmp_p
         assert built["readme"]["text"] == written
         assert "urls" not in built
         return
-    assert targets(built["readme"]["text"]) == [f"{ADDRESS}/blob/HEAD/{target}" for target in targets(written)]
+    folders = ["raw" if target.endswith(".png") else "blob" for target in targets(written)]  # a picture as it is
+    expected = [f"{ADDRESS}/{folder}/HEAD/{target}" for folder, target in zip(folders, targets(written), strict=True)]
+    assert targets(built["readme"]["text"]) == expected
     assert built["urls"]["Homepage"] == ADDRESS
