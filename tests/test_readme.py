@@ -19,9 +19,9 @@ TIME = re.compile(r"\b\d+(\.\d+)? s\b")
 NUMBER = re.compile(r"\d+(\.\d+)?(e[+-]?\d+)?")
 SMALL = {  # what makes a command quick, by the word that follows `koop`
     "evaluate": "--set sample.count=9 --set sample.columns=4 --set test.count=40 --set test.steps=5",
-    "plot": "--set sample.count=9 --set sample.columns=4",
+    "plot": "--set sample.count=9 --set sample.columns=4 --set test.point.steps=60",
     "sweep": "--set sample.count=9 --set sample.columns=4 --set test.count=40 --set test.steps=5",
-    "reproduce": "--experiment ../tiny.toml",
+    "reproduce": "--experiment ../tiny.toml --dry-run",
 }
 
 
@@ -66,7 +66,7 @@ def my_car(folder):
 
 
 @pytest.mark.parametrize("session", SESSIONS, ids=lambda session: session[0][0])
-def test_commands_print_what_is_shown(koop, stocked, my_car, session):
+def test_commands_print_what_is_shown(koop, my_car, session):
     run(koop, session, small=True)
 
 

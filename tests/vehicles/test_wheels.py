@@ -163,7 +163,7 @@ def test_the_ellipse_between_its_axes():
     assert (full[0] / D_x) ** 2 + (full[1] / D_y) ** 2 == pytest.approx(np.ones(500))  # sliding fully it is the ellipse
 
 
-@pytest.mark.parametrize("kind", ["rolling", "anything"])
+@pytest.mark.parametrize("kind", ["rolling", pytest.param("anything", marks=pytest.mark.slow)])
 def test_energy_of_body_and_wheels_never_grows(plant, states, kind):
     """Without torque and steer, forwards and in reverse, whatever the wheels do at first."""
     x0 = rolling(plant, *np.linspace(-30, 30, 41)) if kind == "rolling" else states
@@ -173,11 +173,13 @@ def test_energy_of_body_and_wheels_never_grows(plant, states, kind):
     assert (energy[:, -1] < energy[:, 0]).all()
 
 
+@pytest.mark.slow
 def test_at_standstill_no_state_moves(plant):
     for u in (np.zeros(6), np.array([0.3, 0, 0, -0.1, 0, 0]), np.array([0.0, 0, 500, 0, 0, 500])):  # brakes hold it too
         assert not run(plant, np.zeros(5), u, 0.5).any()
 
 
+@pytest.mark.slow
 def test_halving_the_substeps_moves_the_body_by_less_than_a_thousandth(plant):
     """Every speed under every input."""
     speeds = np.array([1.0, 5.0, 30.0])
