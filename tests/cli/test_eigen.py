@@ -165,7 +165,8 @@ def test_a_foreign_test_set(koop):
     one_line(koop("evaluate", koop("fit-eigen").name, "--excitation", "held"), 2, "'test.excitation' belongs to kind")
 
 
-@pytest.mark.parametrize("figure", ["error-map", pytest.param("mean-trajectory", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("figure", ["error-map", "mean-trajectory"])
 def test_figures_of_an_evaluation_of_any_method(koop, folder, figure):
     for of in (koop("fit-eigen"), koop("fit-edmd"), koop("baseline", "hold")):
         done = koop("plot", figure, koop("evaluate", of.name).name, "-o", "out.png")

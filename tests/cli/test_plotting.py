@@ -29,7 +29,7 @@ def inputs_of(koop, name):
     return [record["inputs"][f"{i}/{role}"] for i in range(sum(key.endswith(f"/{role}") for key in record["inputs"]))]
 
 
-@pytest.mark.parametrize("name", in_time(FIGURES, "frontier", "trajectory"))
+@pytest.mark.parametrize("name", in_time(FIGURES, "frontier", "trajectory", "before-after", "trust"))
 def test_a_figure_named_alone_makes_what_it_needs(koop, folder, undrawn, name):
     done = koop("plot", name, "-o", "figure.png", "--csv", "figure.csv", "--json")
     assert done.code == 0, done.err

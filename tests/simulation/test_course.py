@@ -88,7 +88,8 @@ def test_ends_do_not_depend_on_the_batch(monkeypatch):
     assert 0 < course.finished.sum() < 40
 
 
-@pytest.mark.parametrize("name", ["ctu-2020", pytest.param("bmw-320i", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ctu-2020", "bmw-320i"])
 def test_the_reference_solver_agrees(name):
     plant = TorqueInput(vehicle_named(name))
     r_w = plant.parameters.r_w

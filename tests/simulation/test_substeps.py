@@ -72,6 +72,7 @@ def test_fourth_order_on_tyres(sliding):
     assert 13 < errors[1] / errors[2] < 20
 
 
+@pytest.mark.slow
 def test_slower_than_v_eps_stays_finite(vehicle):
     plant = SlipInput(vehicle, v_eps=0.01)
     x0 = np.array([[0.0, 0.0, 0.0], [1e-3, 1e-3, 1e-3], [0.0, 0.5, 0.0]])
