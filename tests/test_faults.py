@@ -9,7 +9,8 @@ import pytest
 from tests.faults import damage, errors, kills
 
 
-@pytest.mark.parametrize("writers", [pytest.param(1, marks=pytest.mark.slow), 2])
+@pytest.mark.slow
+@pytest.mark.parametrize("writers", [1, 2])
 def test_killed_writers_lose_nothing(tmp_path, writers):
     count = kills(tmp_path, 10, writers, seed=writers)
     assert count.struck >= 6

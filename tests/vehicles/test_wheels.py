@@ -190,6 +190,7 @@ def test_halving_the_substeps_moves_the_body_by_less_than_a_thousandth(plant):
     assert np.abs(chosen - halved)[:, -1, :3].max() <= 1e-3
 
 
+@pytest.mark.slow
 def test_one_step_a_sample_chatters(plant):
     """What the substeps are for: at 1 m/s the wheel flips from side to side, and nothing blows up to say so."""
     x0, u = rolling(plant, 1.0), np.tile([0.1, 0, 300.0, 0, 0, 300.0], (1, 30, 1))
