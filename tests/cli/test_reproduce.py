@@ -163,6 +163,7 @@ def test_the_eigenfunction_tables(koop, folder, stocked):
     assert "not of the paper's size" in done.err
 
 
+@pytest.mark.slow
 def test_a_changed_eigenfunction_run_beside_the_plain_one(koop, stocked):
     done = koop("reproduce", "eigen", "--set", "vehicle.mu_scale=2", "--json")
     plain, changed = json.loads(done.out)["runs"]
@@ -179,6 +180,7 @@ def test_a_changed_eigenfunction_run_beside_the_plain_one(koop, stocked):
     assert headline == doubled["grip × 2"]
 
 
+@pytest.mark.slow
 def test_both_methods_share_one_report_and_a_change_goes_where_it_belongs(koop, folder, stocked):
     done = koop("reproduce", "--set", "vehicle.lateral.mu=1.5", "--json")
     found = json.loads(done.out)
@@ -199,6 +201,7 @@ def cells(done, block):
     return {(c["label"], c["vehicle"]): c["rmse"]["mean"] for c in run["evaluations"] if c["block"] == block}
 
 
+@pytest.mark.slow
 def test_vehicles_keep_apart_whatever_they_are_called(koop, folder, stocked):
     """One that is changed in the file beside its namesake as shipped; one file under another path only once."""
     text = (folder.parent / "tiny.toml").read_text().replace("seeds = [0, 1]", "seeds = [0]")

@@ -19,6 +19,7 @@ from koopcli.vehicles.single_track import SlipInput
 from koopcli.vehicles.symmetry import images
 from tests.conftest import ball_of, eigen_fit, surface_of, trajectories_of
 
+pytestmark = pytest.mark.slow  # minutes of fits at full size
 REFERENCE = json.loads((Path(__file__).parents[1] / "golden" / "beyond_reference.json").read_text())
 VEHICLES = ("ctu-2020", "rimac-2018")
 AHEAD = {"window": "horizon", "kind": "comb", "cut": 1e-10}

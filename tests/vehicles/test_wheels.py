@@ -234,6 +234,7 @@ ROUGH = np.array(
 )
 
 
+@pytest.mark.slow
 def test_rough_treatment_stays_finite():
     plant = TorqueInput(vehicle_named("rimac-2018"))
     x = run(plant, ROUGH["x0"], ROUGH["u"], 1.0)
