@@ -52,6 +52,7 @@ def test_a_predictor_without_trust_has_no_bounds(koop):
     one_line(koop("plot", "trust", found["name"]), 3, "says nothing of its errors: fit with --trust")
 
 
+@pytest.mark.slow
 def test_lifts_and_rates_by_option(koop):
     data = koop("simulate", "--plant", "slips").name
     scores = {}

@@ -53,6 +53,7 @@ def test_again_from_the_store_without_a_write(koop, folder, stocked):
     assert {path: path.stat().st_mtime_ns for path in (folder / "artefacts").rglob("*")} == before
 
 
+@pytest.mark.slow
 def test_one_changed_assumption_beside_the_unmodified_run(koop, folder, stocked):
     few = ["--set", "reproduce.orders=[1]", "--set", "reproduce.excitations=['fresh']", "--json"]
     plain = koop("reproduce", "edmd", *few)

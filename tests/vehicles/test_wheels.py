@@ -210,6 +210,7 @@ def test_the_rate_is_the_stiffness_of_the_plant(plant):
         assert max(wheel_poles(plant.parameters, speed, plant.v_eps)) == pytest.approx(rate, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*VEHICLES, "odd"])
 def test_a_steady_turn_is_that_of_the_linear_car(name, odd):
     """Yaw rate per steer v / (L + K v²) within 1 % at small steer; ``odd`` has K ≠ 0."""
