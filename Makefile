@@ -7,8 +7,7 @@ KOOP := $(BIN)/koop
 
 .DEFAULT_GOAL := help
 .PHONY: help reproduce reproduce-edmd reproduce-eigen reproduce-beyond smoke test test-all test-lowest test-newest check \
-  docs pins bench peers scaling faults kernels \
-  traps wheel clean
+  docs pins bench peers scaling faults kernels traps wheel clean
 
 help: ## Show this help
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 20
