@@ -125,7 +125,7 @@ def test_a_vehicle_without_wheels(koop, folder):
     one_line(koop("sample", "manoeuvre", "--vehicle", "bare.toml"), 3, "inertia J_R and radius r_w")
     checked = koop("vehicle", "check", "bare.toml", tiny=False)
     assert checked.code == 0
-    assert "for the plants forces, slips" in checked.err
+    assert "with the plants forces, slips" in checked.err
     assert "no wheels" in checked.err
 
 
