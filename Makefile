@@ -29,7 +29,7 @@ smoke: $(VENV)/.installed ## Run both methods on reduced datasets, in a store of
 	$(KOOP) reproduce all --smoke --store "$$store" && \
 	$(KOOP) reproduce all --smoke --store "$$store" 2>/dev/null
 
-test: $(VENV)/.developing ## Run the tests, on every core (four minutes on two)
+test: $(VENV)/.developing ## Run the tests, on every core (minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal
 
 test-all: $(VENV)/.developing ## Run the slow tests too
