@@ -56,10 +56,10 @@ def _run(argv: Sequence[str] | None) -> int:
         os.environ.setdefault("MPLCONFIGDIR", os.devnull)  # no folder: it makes one and removes it
     import typer  # noqa: PLC0415  (inside, so that Ctrl-C while it loads is answered too)
 
-    from koopcli.cli.app import app  # noqa: PLC0415
+    from koopcli.cli.app import root  # noqa: PLC0415
 
     try:
-        code = app(args=argv, prog_name="koop", standalone_mode=False)
+        code = root()(args=argv, prog_name="koop", standalone_mode=False)
     except typer.Abort:
         return INTERRUPTED
     except typer.TyperException as error:

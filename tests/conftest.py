@@ -47,7 +47,7 @@ steps = 5
 count = 40
 steps = 5
 [evaluate]
-chunk = 10
+chunk = 20
 [reproduce]
 orders = [1, 2]
 draw_seeds = [0]

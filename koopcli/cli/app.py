@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from functools import cache
+from typing import Annotated, Any
 
 import typer
 
@@ -37,6 +38,12 @@ comparing.register(app)
 keeping.register(app)
 vehicles.register(app)
 command.prepare(app)
+
+
+@cache
+def root() -> Any:
+    """The command ``koop``, built once a process."""
+    return typer.main.get_command(app)
 
 
 def _version(wanted: bool) -> None:

@@ -10,7 +10,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import typer
 
-from koopcli.cli.app import app
+from koopcli.cli.app import root
 from koopcli.config.pictures import PlotOptions
 from koopcli.config.samples import SAMPLES
 from koopcli.config.settings import About, Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
@@ -39,8 +39,7 @@ everything else on stderr; with `--json` it prints one JSON object.
 
 def reference() -> str:
     """The whole page as Markdown."""
-    root: Any = typer.main.get_command(app)
-    commands = [line for name, command in root.commands.items() for line in _command(name, command)]
+    commands = [line for name, command in root().commands.items() for line in _command(name, command)]
     return "\n".join([HEAD, *commands, *_settings(), ""])
 
 

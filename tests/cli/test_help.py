@@ -6,14 +6,13 @@ import sys
 from pathlib import Path
 
 import pytest
-import typer
 
 from koopcli.__main__ import main
-from koopcli.cli.app import FIRST, app
+from koopcli.cli.app import FIRST, root
 from koopcli.cli.reference import reference
 
 ROOT = Path(__file__).parents[2]
-TOP = typer.main.get_command(app).commands
+TOP = root().commands
 COMMANDS = {
     " ".join([name, *part]): inner
     for name, command in TOP.items()

@@ -40,12 +40,15 @@ def uninterrupted(tmp_path_factory) -> dict[str, str]:
     return objects(folder / "work" / "artefacts")
 
 
+KILLS = (1, 4, 9, 20)  # chunks that are there; the later ones are of later stages, or the process is done before
+
+
 @pytest.mark.parametrize(
-    "workers", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(4, marks=pytest.mark.slow)]
+    ("workers", "kills"), [(2, KILLS[2:3]), *(pytest.param(n, KILLS, marks=pytest.mark.slow) for n in (1, 2, 4))]
 )
-def test_killed_and_run_again_it_ends_the_same_whatever_the_workers(folder, uninterrupted, workers):
+def test_killed_and_run_again_it_ends_the_same_whatever_the_workers(folder, uninterrupted, workers, kills):
     rng = random.Random(workers)
-    for there in (1, 4, 9, 20):  # the later ones are of later stages, or the process is done before
+    for there in kills:
         process = start(folder, *SHARED, "--workers", str(workers))
         while chunks(folder) < there + rng.randrange(3) and process.poll() is None:
             time.sleep(0.002)

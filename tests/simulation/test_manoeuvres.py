@@ -13,7 +13,7 @@ from koopcli.simulation.integrate import simulate
 from koopcli.simulation.manoeuvres import MANOEUVRES, Driver
 from koopcli.vehicles.single_track import TorqueInput
 
-LONG = ("brake-in-turn", "double-lane-change")
+LONG = ("brake-in-turn", "double-lane-change", "drift-entry")
 
 
 @cache
@@ -62,6 +62,7 @@ def test_step_steer_holds_its_lateral_acceleration():
     assert len(moved) <= 15
 
 
+@pytest.mark.slow
 def test_the_double_lane_change_comes_to_the_next_lane_and_back():
     _, _, place = drive("double-lane-change")
     between = (place[:, 0] > 50) & (place[:, 0] < 65)

@@ -27,7 +27,7 @@ class Settings:
     levels: tuple[float, ...] = (1.0, 5.0)
 
 
-@settings(max_examples=50)
+@settings(max_examples=20)
 @given(st.dictionaries(TEXT, JSON))
 def test_order_of_keys_does_not_matter(value):
     assert canonical(dict(reversed(value.items()))) == canonical(value)

@@ -146,10 +146,18 @@ def test_grip_scales_every_tyre_force(sliding, states):
     assert bare.rhs(states, u) == pytest.approx(ForceInput(sliding.parameters).rhs(states, 0 * u), abs=1e-12)
 
 
-@pytest.mark.parametrize("start", ["surface", "ball"])
-def test_energy_never_grows_on_tyres(slips, start):
-    """Every trajectory of the paper's size and its reverse, relative 1e-9 (a single step per sample fails by 2e-7)."""
-    sample, steps = (surface_of(slips, 441), 150) if start == "surface" else (ball_of(slips), 50)
+@pytest.mark.parametrize(
+    ("starts", "count", "steps"),
+    [
+        (surface_of, 100, 50),
+        (ball_of, 1000, 25),
+        pytest.param(surface_of, 441, 150, marks=pytest.mark.slow),  # the paper's size
+        pytest.param(ball_of, 2000, 50, marks=pytest.mark.slow),
+    ],
+)
+def test_energy_never_grows_on_tyres(slips, starts, count, steps):
+    """Every trajectory and its reverse, relative 1e-9 (a single step per sample fails by 2e-7)."""
+    sample = starts(slips, count)
     for sign in (1, -1):
         x0 = sample.states * np.array([sign, sign, 1])
         u = np.zeros((len(x0), steps, 4))
