@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 RESOLUTION ?=
+# One thread a process, and what Python compiled is kept, whatever the environment says.
+PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --dist worksteal
 KOOP := $(BIN)/koop
 
 .DEFAULT_GOAL := help
@@ -30,10 +32,10 @@ smoke: $(VENV)/.installed ## Run both methods on reduced datasets, in a store of
 	$(KOOP) reproduce all --smoke --store "$$store" 2>/dev/null
 
 test: $(VENV)/.developing ## Run the tests, on every core (minutes)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal
+	$(PYTEST)
 
 test-all: $(VENV)/.developing ## Run the slow tests too
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal -m ''
+	$(PYTEST) -m ''
 
 test-lowest: ## Run the tests with the lowest version allowed of every dependency (for Python 3.11, which has them all)
 	$(MAKE) VENV=.venv-lowest RESOLUTION=lowest-direct test

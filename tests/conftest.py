@@ -122,7 +122,7 @@ def stocks(tmp_path_factory) -> Path:
 @pytest.fixture(scope="session")
 def reproduced(stocks) -> Path:
     """A store with all that `koop reproduce` makes of the tiny experiment."""
-    return stock.obtain(stocks, TINY, "reproduced", [["reproduce"]])
+    return stock.obtain(stocks, TINY, "reproduced", [["reproduce", "--json"]])
 
 
 @pytest.fixture

@@ -20,18 +20,19 @@ KEPT = ("records", "objects")  # neither locks nor pins: those belong to whoever
 def obtain(root: Path, experiment: str, name: str, commands: Sequence[Sequence[str]]) -> Path:
     """The store ``name`` under ``root``, in which ``commands`` were run with an ``experiment`` (its text).
 
-    The first to ask makes it, in whatever process of the run; the others wait.
+    The first to ask makes it, in whatever process of the run; the others wait. What the last command printed stands
+    beside it, in ``name.out``.
     """
     store = root / name
     with FileLock(root / f"{name}.lock"):
-        if not (root / f"{name}.made").exists():
+        if not (root / f"{name}.out").exists():
             file = root / f"{name}.toml"
             file.write_text(experiment)
             for command in commands:
                 words = [sys.executable, "-m", "koopcli", *command, "--experiment", str(file), "--store", str(store)]
                 done = subprocess.run(words, capture_output=True, text=True, check=False)
                 assert done.returncode == 0, done.stderr
-            (root / f"{name}.made").touch()
+            (root / f"{name}.out").write_text(done.stdout)
     return store
 
 

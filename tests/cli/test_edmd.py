@@ -16,11 +16,11 @@ from tests.cli.test_errors import one_line
 @pytest.mark.parametrize(
     ("options", "functions"),
     [
-        (["--order", "2"], 27),
+        pytest.param(["--order", "2"], 27, marks=pytest.mark.slow),
         pytest.param(["--basis", "total", "--order", "3"], 20, marks=pytest.mark.slow),
         pytest.param(["--basis", "anisotropic", "--order", "4", "--terms", "bilinear"], 15, marks=pytest.mark.slow),
         (["--basis", "anisotropic", "--order", "3", "--degree-velocity", "2", "--terms", "generator"], 24),
-        (["--basis", "thin-plate", "--centres", "12"], 16),
+        pytest.param(["--basis", "thin-plate", "--centres", "12"], 16, marks=pytest.mark.slow),
         pytest.param(
             ["--basis", "thin-plate", "--placement", "drawn", "--terms", "bilinear", "--ridge", "1e-6"],
             24,

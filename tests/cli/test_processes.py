@@ -142,9 +142,9 @@ def test_odd_streams_are_no_internal_error(folder):
     assert full.stderr == "koop: cannot write the output: No space left on device\n"
     for command in (
         "koop ls >&-",
-        "koop fit-edmd --experiment ../tiny.toml 2>&-",
+        "koop sample --experiment ../tiny.toml 2>&-",
         "PYTHONIOENCODING=latin-1 koop --help",
-        "LC_ALL=C PYTHONUTF8=0 koop fit-edmd --help",
+        "LC_ALL=C PYTHONUTF8=0 koop ls --help",
         "koop sample --store $'bad\\xff' --experiment ../tiny.toml",
     ):
         done = shell(folder, command)

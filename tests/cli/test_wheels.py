@@ -97,6 +97,7 @@ def test_options_of_other_plants_are_refused(koop):
     one_line(koop("simulate", koop("sample", "box").name, "--plant", "wheels"), 3, "drive or drive-test or manoeuvre")
 
 
+@pytest.mark.slow  # what ends early took many steps before
 def test_a_diverging_trajectory_is_data(koop):
     """Some end early: they are told, kept up to their end, and left out of fits and scores."""
     wild = ("--set", "sample.count=20", "--set", "sample.steps=5", "--set", "simulate.v_eps=1e-9")

@@ -445,7 +445,7 @@ def scored(full, tests):
     return fitted, figures
 
 
-@pytest.mark.parametrize("draw", ["random", "even"])
+@pytest.mark.parametrize("draw", [pytest.param("random", marks=pytest.mark.slow), "even"])
 def test_the_reference_table_at_full_size(full, scored, draw):
     """Means and medians within 1 % (or half the last printed digit) and the yaw rate to rounding, orders 3 to 8."""
     fitted, figures_of = scored
@@ -461,6 +461,7 @@ def test_the_reference_table_at_full_size(full, scored, draw):
             assert figures["max_error"]["yaw_rate"] <= limit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_yaw_rate_on_other_random_draws(scored, seed):
     """Rounding grows with the order and with how far the draw leaves the edges open; seed 2 is the worst of five."""
@@ -468,7 +469,7 @@ def test_yaw_rate_on_other_random_draws(scored, seed):
         assert scored[1](excitation, "random", 7, seed)["max_error"]["yaw_rate"] <= 1e-6
 
 
-@pytest.mark.parametrize("draw", ["random", "even"])
+@pytest.mark.parametrize("draw", [pytest.param("random", marks=pytest.mark.slow), "even"])
 def test_bilinear_terms_break_the_floor_with_27_functions(full, tests, draw):
     data = full(draw, 0)
     predictor = edmd.fit(data, edmd.basis_from_data(data, Choice("anisotropic", 8)), edmd.Method(bilinear=True))
@@ -482,6 +483,7 @@ def test_bilinear_terms_break_the_floor_with_27_functions(full, tests, draw):
         assert score["mean"] < limit * REFERENCE["bilinear"][draw][excitation]
 
 
+@pytest.mark.slow
 def test_the_error_falls_with_the_order_and_then_stays(scored):
     """Strictly to order 5 on every draw; within 1 % from 6 to 8 on even points with fresh inputs."""
     for draw, seed in (("random", 0), ("random", 1), ("random", 2), ("even", 0), ("chebyshev", 0)):
@@ -491,7 +493,7 @@ def test_the_error_falls_with_the_order_and_then_stays(scored):
         assert max(means[5:], default=1.0) < 1.01 * min(means[5:], default=1.0)
 
 
-@pytest.mark.parametrize("draw", ["even", "chebyshev"])
+@pytest.mark.parametrize("draw", ["even", pytest.param("chebyshev", marks=pytest.mark.slow)])
 def test_yaw_rate_on_even_points_to_order_ten(scored, tests, draw):
     figures = evaluate(scored[0](draw, 10, 0), tests["fresh"], slice(0, 1000), 1, relift=False).figures()
     assert figures["max_error"]["yaw_rate"] <= 1e-9

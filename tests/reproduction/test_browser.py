@@ -7,15 +7,12 @@ import json
 import os
 import re
 import shutil
-import subprocess
-import sys
 import time
+from pathlib import Path
 
 import pytest
 
 from koopcli.reproduction.report import number_text
-from tests import stock
-from tests.conftest import TINY
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
@@ -39,15 +36,10 @@ SMALLEST = 9  # px
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory, reproduced):
+def report(reproduced):
     """A report on tiny data, its path and its JSON."""
-    work = tmp_path_factory.mktemp("report")
-    (work / "tiny.toml").write_text(TINY)
-    stock.link(reproduced, work / "store")
-    command = [sys.executable, "-m", "koopcli", "reproduce", "--experiment", "tiny.toml", "--json", "--store", "store"]
-    done = subprocess.run(command, cwd=work, capture_output=True, text=True, check=True)
-    found = json.loads(done.stdout)
-    return work / found["path"], found
+    found = json.loads(reproduced.with_suffix(".out").read_text())
+    return Path(found["path"]), found
 
 
 @pytest.fixture(scope="module")
@@ -197,7 +189,8 @@ def test_a_click_enlarges_and_a_button_copies(opened):
     line.find_element("css selector", "button").click()
     until(opened, "return arguments[0].textContent === 'Copied'", line.find_element("css selector", "button"))
     copied = opened.execute_async_script("navigator.clipboard.readText().then(arguments[0])")
-    assert copied == line.find_element("css selector", "code").text == "koop reproduce all --experiment tiny.toml"
+    assert copied == line.find_element("css selector", "code").text
+    assert copied.startswith("koop reproduce all --experiment ")
 
 
 def test_the_tables_hold_the_numbers_of_the_json(opened, report):

@@ -82,10 +82,6 @@ def test_the_report_of_both_methods(koop, folder, stocked):
     (opening,) = [row for row in text.tables[""] if row[0] == "eigenfunctions, ctu-2020"]
     assert mean[2].startswith(opening[2])  # the same score
 
-    again = koop("reproduce", "--json")
-    assert again.out == done.out
-    assert "made in" not in again.err
-
 
 @pytest.mark.slow
 def test_every_command_of_the_report_makes_its_figure(koop, stocked):

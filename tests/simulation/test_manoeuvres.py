@@ -13,8 +13,6 @@ from koopcli.simulation.integrate import simulate
 from koopcli.simulation.manoeuvres import MANOEUVRES, Driver
 from koopcli.vehicles.single_track import TorqueInput
 
-LONG = ("brake-in-turn", "double-lane-change", "drift-entry")
-
 
 @cache
 def both_ways(name, vehicle="bmw-320i"):
@@ -40,10 +38,8 @@ def lateral(x):
     return np.gradient(x[:, 1], 0.01) + x[:, 2] * x[:, 0]
 
 
-@pytest.mark.parametrize(
-    "name",  # a car that comes to a standstill needs hundreds of substeps, a lane change is long
-    [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in MANOEUVRES],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MANOEUVRES)
 def test_every_manoeuvre_has_a_source_and_a_mirror_image(name):
     assert MANOEUVRES[name].source
     assert MANOEUVRES[name].about
@@ -56,6 +52,8 @@ def test_every_manoeuvre_has_a_source_and_a_mirror_image(name):
 
 def test_step_steer_holds_its_lateral_acceleration():
     x, u, _ = drive("step-steer")
+    (_, mirrored), _ = both_ways("step-steer")
+    assert mirrored == pytest.approx(x * [1, -1, -1, 1, 1], rel=1e-6, abs=1e-6)
     assert lateral(x)[-1] == pytest.approx(4.0, rel=0.06)  # linear, of a tyre that is not
     assert np.ptp(x[:, 0]) < 0.3  # its drive torque makes up for drag
     moved = np.flatnonzero((u[:, 0] > 0.01 * u[-1, 0]) & (u[:, 0] < 0.99 * u[-1, 0]))

@@ -293,7 +293,7 @@ def test_cut_off_after_the_move_the_next_one_puts_it_back(store, monkeypatch):
 
 def test_committing_and_collecting_at_once_loses_nothing(store):
     """One process commits what another takes for an orphan, again and again, at every moment of each other's work."""
-    for seed in range(20):
+    for seed in range(6):
         orphaned(store, float(seed))
         failed = []
 

@@ -137,6 +137,7 @@ def test_the_rest_does_its_harm_where_nothing_walks(shelf):
     assert "/".join(["g"] * 100) in h5py.File(shelf / "a_hundred_deep.h5")
 
 
+@pytest.mark.slow  # it waits
 def test_hdf5_never_returns_from_a_heap_that_goes_nowhere(shelf):
     """If it ever does, the texts can be read by HDF5 again."""
     read = f"import h5py; h5py.File({str(shelf / 'heap_that_goes_nowhere.h5')!r}).attrs['meta']"
