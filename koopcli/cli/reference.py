@@ -8,8 +8,6 @@ from textwrap import fill
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
-import typer
-
 from koopcli.cli.app import root
 from koopcli.config.pictures import PlotOptions
 from koopcli.config.samples import SAMPLES

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 
 import numpy as np
@@ -183,7 +184,7 @@ def test_beyond_in_one_command(koop, folder, beyond):
     for title in ("Beyond the paper: RMSE", "One ingredient taken away", "How many modes", "Trust: 90 % bounds"):
         assert title in result.err
     page = next((folder / "artefacts" / "reports").glob("*/report.html")).read_text()
-    assert "koop reproduce eigen --beyond --experiment" in page
+    assert "koop reproduce eigen --beyond --experiment" in re.sub("<[^>]*>", "", page)
     assert koop("reproduce", "eigen", "--beyond", "--dry-run").out.count(" make ") == 0  # all of it is there
 
 

@@ -201,7 +201,7 @@ def small_disk(tmp_path) -> Iterator[Path]:
 @pytest.mark.slow
 def test_a_disk_that_fills_and_one_that_is_read_only(folder, small_disk):
     store = ["--store", str(small_disk / "store")]
-    code, err = run(folder, *SHARED, *store)
+    code, err = run(folder, *SHARED, "--count", "1200", *store)
     assert code == 6
     assert "No space left on device" in err
     assert " needed, " in err
