@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from koopcli.reproduction.ghosts import Shown
     from koopcli.reproduction.illustrations import Illustration
     from koopcli.reproduction.opening import Part
-    from koopcli.reproduction.report import Method, Race, Run
+    from koopcli.reproduction.report import Method, Plan, Race, Run
     from koopcli.stages.base import Task
 
 MethodName = Literal["all", "edmd", "eigen"]
@@ -104,12 +104,16 @@ def reproduce(
     for task in everything:
         call.pipeline.check(task)
     parts = []
-    with call.pipeline.workers:
-        make_ahead(call.pipeline, [*everything, *racing])
-        for one in chosen:
-            done = [report.run_cells(plan, call.pipeline) for plan in plans[one.name]]
-            parts.append(opening.Part(one, done, illustrate(plans[one.name], call.pipeline)))
-        shown = ghosts.run(race, parts[0].runs[0].experiment, call.pipeline)
+    try:
+        with call.pipeline.workers:
+            make_ahead(call.pipeline, [*everything, *racing])
+            for one in chosen:
+                done = [report.run_cells(plan, call.pipeline) for plan in plans[one.name]]
+                parts.append(opening.Part(one, done, illustrate(plans[one.name], call.pipeline)))
+            shown = ghosts.run(race, parts[0].runs[0].experiment, call.pipeline)
+    except KeyboardInterrupt:
+        _show_what_there_is(call, method, list(plans.values()))
+        raise
     _finish(call, method, parts, shown, racing, as_json=as_json)
 
 
@@ -160,6 +164,23 @@ def _runs(call: Invocation, base: str, method: Method) -> list[Run]:
     return runs
 
 
+def _show_what_there_is(call: Invocation, name: str, plans: Sequence[Sequence[Plan]]) -> None:
+    """A report of a run that is interrupted: its first screen, and the scores and figures made so far."""
+    from koopcli.reproduction.illustrations import illustrations_there
+    from koopcli.reproduction.opening import Part
+    from koopcli.reproduction.report import cells_there
+
+    reason = "the run was interrupted"
+    parts = []
+    for some in plans:
+        runs = [cells_there(plan, call.pipeline) for plan in some]
+        pictures = illustrations_there(some, call.pipeline, reason)
+        parts.append(Part(some[0].method, runs, pictures, sum(len(plan.cells) for plan in some)))
+    if any(run.scored for part in parts for run in part.runs):
+        path = _write_report(call, name, parts, reason, "interrupted")
+        call.console.note(f"a report of what there is so far: {path}")
+
+
 def _finish(
     call: Invocation, name: str, parts: Sequence[Part], shown: Shown | str, racing: Sequence[Task], *, as_json: bool
 ) -> None:
@@ -197,7 +218,9 @@ def _identity(parts: Sequence[Part]) -> str:
     return hashlib.sha256("\n".join(names).encode()).hexdigest()[:12]
 
 
-def _write_report(call: Invocation, name: str, parts: Sequence[Part], shown: Shown | str) -> Path:
+def _write_report(
+    call: Invocation, name: str, parts: Sequence[Part], shown: Shown | str, identity: str | None = None
+) -> Path:
     from koopcli import __version__
     from koopcli.reproduction.opening import opening
     from koopcli.reproduction.page import Section, page
@@ -205,13 +228,13 @@ def _write_report(call: Invocation, name: str, parts: Sequence[Part], shown: Sho
     from koopcli.store.files import publish, storage_errors
 
     root = call.pipeline.store.root
-    path = root / "reports" / f"{name}-{_identity(parts)}" / "report.html"
+    path = root / "reports" / f"{name}-{identity or _identity(parts)}" / "report.html"
     sections = [
         Section(
             part.method.name,
             f"{part.method.title[0].upper()}{part.method.title[1:]}",
-            part.method.tables(part.runs),
-            part.method.notes(part.runs),
+            part.method.tables(part.runs) if part.whole else [],
+            part.method.notes(part.runs) if part.whole else [],
             part.illustrations,
             full_table(part.method, part.runs),
         )

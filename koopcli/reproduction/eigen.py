@@ -212,7 +212,10 @@ def _as_in_the_paper(experiment: Experiment) -> bool:
 def _beaten(run: Run, vehicle: str) -> str | None:
     """Which baselines do better than the headline on ``vehicle``."""
     seed = run.experiment.reproduce.seeds[0]
-    headline = _figures(run, HEADLINE, None, vehicle, seed)["rmse"]["mean"]
+    figures = _figures(run, HEADLINE, None, vehicle, seed)
+    if figures is None:
+        return None
+    headline = figures["rmse"]["mean"]
     better = {
         s.cell.label: s.figures["rmse"]["mean"]
         for s in run.scored

@@ -45,10 +45,10 @@ def _edmd_numbers(runs: Sequence[Run]) -> list[Number]:
     order, main = edmd_cells.best_order(first), edmd_cells.excitation(first)
     paper = f"{BEST_RMSE}" if order in BEST_ORDERS else "–"
     both = [_edmd(run, main) for run in runs]
-    functions = next((bilinear["functions"] for _, bilinear in both if bilinear is not None), 0)
+    counted = next((f"{bilinear['functions']} " for _, bilinear in both if bilinear is not None), "")
     found = [
         Number(f"EDMD, order {order}, {INPUTS[main]}", paper, [mean_text(linear) for linear, _ in both]),
-        Number(f"{functions} bilinear functions, the same inputs", "–", [mean_text(bilinear) for _, bilinear in both]),
+        Number(f"{counted}bilinear functions, the same inputs", "–", [mean_text(bilinear) for _, bilinear in both]),
     ]
     for kind in reversed([kind for kind in first.reproduce.excitations if kind != main]):
         here = [mean_text(_edmd(run, kind)[0]) for run in runs]
@@ -59,13 +59,15 @@ def _edmd_numbers(runs: Sequence[Run]) -> list[Number]:
 def _edmd_clause(run: Run) -> str:
     order = edmd_cells.best_order(run.experiment)
     linear, bilinear = _edmd(run, edmd_cells.excitation(run.experiment))
-    if linear is None or bilinear is None:
+    if linear is None:
         return "EDMD has no scores"
     counted = f"{count_text(linear['functions'])} polynomials (EDMD, order {order})"
     stated = f"{BEST_RMSE} % is the paper's best" if order in BEST_ORDERS else f"the paper's best is {BEST_RMSE} %"
+    said = f"Under random inputs, {counted} {_misses(linear)} ({stated})"
     return (
-        f"Under random inputs, {counted} {_misses(linear)} ({stated}), {bilinear['functions']} bilinear functions of "
-        f"the same data {_misses(bilinear)}"
+        said
+        if bilinear is None
+        else f"{said}, {bilinear['functions']} bilinear functions of the same data {_misses(bilinear)}"
     )
 
 
@@ -88,6 +90,8 @@ def _eigen(run: Run, **wanted: object) -> Meta | None:
 
 def _eigen_numbers(runs: Sequence[Run]) -> list[Number]:
     vehicles = list(dict.fromkeys(scored.cell.vehicle for scored in runs[0].scored))
+    if not vehicles:
+        return []
     found = []
     for vehicle in vehicles:
         paper = PAPER_EIGEN if vehicle == vehicles[0] else "–"

@@ -15,7 +15,7 @@ from koopcli.stages import drawn
 from koopcli.stages.base import Task
 from koopcli.stages.effects import why_idle
 from koopcli.stages.naming import names
-from koopcli.stages.pipeline import Pipeline
+from koopcli.stages.pipeline import Artefact, Pipeline
 from koopcli.store import Record
 
 
@@ -43,23 +43,42 @@ def illustrate(plans: Sequence[Plan], pipeline: Pipeline) -> list[Illustration]:
     What cannot be drawn, as an evaluation where every prediction diverged, is left out with the reason.
     """
     found = []
+    wanted = _wanted(plans)
+    with pipeline.reporter.progress(f"figures of {plans[0].method.name}") as progress:
+        for i, (run, picture) in enumerate(wanted):
+            progress(i, len(wanted))
+            try:
+                found.append(_drawn(run, picture, pipeline.make(picture.task), pipeline))
+            except InvalidValueError as error:
+                found.append(_undrawn(run, picture, str(error)))
+    return found
+
+
+def illustrations_there(plans: Sequence[Plan], pipeline: Pipeline, reason: str) -> list[Illustration]:
+    """The pictures of the plans that the store has, and why there are no others; nothing is made."""
+    return [
+        _undrawn(run, picture, reason) if artefact is None else _drawn(run, picture, artefact, pipeline)
+        for run, picture in _wanted(plans)
+        for artefact in [pipeline.there(picture.task)]
+    ]
+
+
+def _wanted(plans: Sequence[Plan]) -> list[tuple[Run, Picture]]:
+    """Every picture once, with the first run that it is of."""
     wanted: dict[Task, tuple[Run, Picture]] = {}
     for plan in plans:
         for picture in plan.pictures:
             wanted.setdefault(picture.task, (plan.run, picture))
-    with pipeline.reporter.progress(f"figures of {plans[0].method.name}") as progress:
-        for i, (run, picture) in enumerate(wanted.values()):
-            progress(i, len(wanted))
-            found.append(_illustration(run, picture, pipeline))
-    return found
+    return list(wanted.values())
 
 
-def _illustration(run: Run, picture: Picture, pipeline: Pipeline) -> Illustration:
+def _undrawn(run: Run, picture: Picture, reason: str) -> Illustration:
     name = picture.task.settings.figure
-    try:
-        made = pipeline.make(picture.task)
-    except InvalidValueError as error:
-        return Illustration(name, picture.caption, run.label, "", None, None, (), str(error), picture.leads)
+    return Illustration(name, picture.caption, run.label, "", None, None, (), reason, picture.leads)
+
+
+def _drawn(run: Run, picture: Picture, made: Artefact, pipeline: Pipeline) -> Illustration:
+    name = picture.task.settings.figure
     main = FIGURES[name].roles[:1]  # the artefact itself comes first
     inputs = {tuple(key.split("/")): one for key, one in made.record.lineage.items()}
     names = [one for (_, role), one in sorted(inputs.items(), key=lambda item: int(item[0][0])) if (role,) == main]

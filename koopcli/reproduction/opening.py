@@ -19,11 +19,17 @@ OTHER = {"edmd": "eigen", "eigen": "edmd"}
 
 @dataclass(frozen=True)
 class Part:
-    """One method of a report with its runs and its pictures."""
+    """One method of a report: its runs and pictures, and how many evaluations were ``planned`` where a run stopped."""
 
     method: Method
     runs: Sequence[Run]
     illustrations: Sequence[Illustration]
+    planned: int | None = None
+
+    @property
+    def whole(self) -> bool:
+        """Whether every evaluation is there, without which its tables and notes cannot be written."""
+        return self.planned is None or self.planned == sum(len(run.scored) for run in self.runs)
 
 
 @dataclass(frozen=True)
@@ -87,6 +93,15 @@ def missing(parts: Sequence[Part], ghosts: Shown | str) -> Iterator[str]:
     names = {part.method.name for part in parts}
     if any(REDUCED in part.method.notes(part.runs) for part in parts):
         yield REDUCED
+    broken = [
+        f"{sum(len(run.scored) for run in part.runs)} of {part.planned} evaluations of {part.method.title}"
+        for part in parts
+        if not part.whole
+    ]
+    if broken:
+        yield (
+            f"The run was interrupted: {' and '.join(broken)} are here, without their tables. The same command goes on."
+        )
     for name in sorted(names & set(ALONE)):
         if OTHER[name] not in names:
             yield f"This report leaves out {ALONE[name]}: koop reproduce {OTHER[name]} makes them."

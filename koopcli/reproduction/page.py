@@ -57,7 +57,8 @@ def _section(section: Section, opening: Illustration | None) -> Iterator[str]:
     for one in section.illustrations:
         if one is not opening:
             yield from figure(one)
-    yield f"</div><h3>What it means</h3>{listed(section.notes, 'notes')}<h3>Tables</h3>"
+    meaning = f"<h3>What it means</h3>{listed(section.notes, 'notes')}" if section.notes else ""
+    yield f"</div>{meaning}<h3>Tables</h3>"
     yield from map(folded, section.tables)
     yield f"{folded(section.every, 'folded every')}</section>"
 

@@ -159,6 +159,13 @@ def run_cells(plan: Plan, pipeline: Pipeline) -> Run:
     return replace(plan.run, scored=tuple(scored))
 
 
+def cells_there(plan: Plan, pipeline: Pipeline) -> Run:
+    """The run of a plan with the scores that the store has; nothing is made or measured."""
+    found = ((cell, pipeline.there(task)) for cell, task in plan.cells)
+    scored = (Scored(cell, artefact.figures, artefact.record) for cell, artefact in found if artefact is not None)
+    return replace(plan.run, scored=tuple(scored))
+
+
 def has_effect(name: str, *, plant: str, swept: Sequence[str], foreign: Sequence[str]) -> bool:
     """Whether the setting ``name`` has an effect on a method with this ``plant``.
 
@@ -172,7 +179,8 @@ def has_effect(name: str, *, plant: str, swept: Sequence[str], foreign: Sequence
 
 def full_table(method: Method, runs: Sequence[Run]) -> Table:
     """Every number of every cell."""
-    about = list(vars(runs[0].scored[0].cell))
+    cells = [scored.cell for run in runs for scored in run.scored]
+    about = list(vars(cells[0])) if cells else []
     header = ["run", *about, "mean", "std", "median", "max", "start", "re-lifted", "as printed"]
     header += ["max yaw error (rad/s)", "worst in emptiest", "diverged", "artefact"]
     rows = []

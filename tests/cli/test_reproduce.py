@@ -10,6 +10,8 @@ from koopcli.config.data import data_folder
 from koopcli.config.experiment import load_experiment
 from koopcli.reproduction import edmd
 from koopcli.reproduction.report import Run, number_text
+from koopcli.stages import ahead
+from tests import stock
 from tests.reproduction.pages import Page
 
 
@@ -241,3 +243,24 @@ def test_the_baselines_of_one_method_ignore_the_settings_of_the_other(koop, fold
     plan = koop("reproduce", "eigen", "--experiment", "mine.toml", "--dry-run", "--json", tiny=False)
     fits = [s["settings"] for s in json.loads(plan.out)["steps"] if s["name"].startswith("fit-edmd")]
     assert {(fit["basis"], fit["order"]) for fit in fits} == {("states", 7), ("tensor", 3), ("tensor", 5)}
+
+
+def test_an_interrupted_run_has_a_report_of_what_there_is(koop, folder, reproduced, monkeypatch):
+    """All of EDMD and no eigenfunctions, and no figure."""
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    stock.link(reproduced, folder / "artefacts", without=["fit-eigen", "plot"])
+    monkeypatch.setattr(ahead, "make_ahead", stop)
+    done = koop("reproduce")
+    assert (done.code, done.out) == (130, "")
+    *_, told, last = done.err.splitlines()
+    assert last.endswith("run the same command again to resume")
+    text = (folder / told.rpartition(": ")[2]).read_text()
+    page = Page(text)
+    assert next(row[2] for row in page.tables[""] if row[0].startswith("EDMD")).count("±") == 1
+    assert re.search(r"interrupted: [1-9]\d* of [1-9]\d* evaluations of eigenfunctions are here", text)
+    assert {figure["text"].partition(".")[0] for figure in page.figures} == {"Not drawn: the run was interrupted"}
+    assert any(title.startswith("EDMD: paper versus here") for title in page.tables)  # nothing of it is missing
+    assert not any(title.startswith("Eigenfunctions: paper") for title in page.tables)
