@@ -58,7 +58,7 @@ def pictures(experiment: Experiment) -> list[Picture]:
         ),
         Picture(
             draw("error-map", [headline]),
-            f"Error by initial state, {name}: each ball is a test state, its size and colour the RMSE.",
+            f"Error by initial state, {name}: its mean in a slice, and every test state as a ball, whose size and colour are its error.",
             leads=True,
         ),
         Picture(

@@ -109,7 +109,7 @@ def _eigen_clause(run: Run) -> str:
     figures = _eigen(run, vehicle=run.scored[0].cell.vehicle) if run.scored else None
     if figures is None:
         return "eigenfunctions have no scores"
-    return f"eigenfunctions of a coasting car {_misses(figures)} (in the paper by {PAPER_EIGEN} %)"
+    return f"eigenfunctions of a coasting car {_misses(figures)} (in the paper by {PAPER_EIGEN}\u00a0%)"
 
 
 def _paper_fit(experiment: Experiment) -> Task:

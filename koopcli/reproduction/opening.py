@@ -104,7 +104,7 @@ def missing(parts: Sequence[Part], ghosts: Shown | str) -> Iterator[str]:
         )
     for name in sorted(names & set(ALONE)):
         if OTHER[name] not in names:
-            yield f"This report leaves out {ALONE[name]}: koop reproduce {OTHER[name]} makes them."
+            yield f"This report leaves out {ALONE[name]}, which koop reproduce {OTHER[name]} adds."
     undrawn: dict[str, list[str]] = {}
     for part in parts:
         for one in part.illustrations:

@@ -15,7 +15,7 @@ from koopcli.reproduction.report import number_text
 
 COLOURS = ("#1b1f24", "#d55e00", "#0072b2")  # the true car, and ghosts
 OVERHANG, HALF_WIDTH = 0.8, 0.9  # m, of a car beyond its axles, and to either side
-MARGIN = 1.0  # m around
+MARGIN = 0.5  # m around
 DECIMALS = 3
 
 
@@ -67,12 +67,13 @@ def _most(track: Track) -> str:
 
 
 def _extent(shown: Shown) -> tuple[FloatArray, FloatArray]:
-    """The corners (2,) of what is drawn: the paths of all cars and their bodies."""
-    every = np.concatenate([track.path[:, :2] for track in shown.tracks])
-    around = shown.vehicle.l_f + OVERHANG + MARGIN / 2
-    low, high = np.nanmin(every, axis=0), np.nanmax(every, axis=0)
-    margin = np.array([around, HALF_WIDTH + MARGIN])
-    return low - margin, high + margin
+    """The corners (2,) of what is drawn: the bodies of all cars along their paths, which may spin."""
+    x, y, heading = np.concatenate([track.path for track in shown.tracks]).T
+    long = max(shown.vehicle.l_f, shown.vehicle.l_r) + OVERHANG
+    cos, sin = np.abs(np.cos(heading)), np.abs(np.sin(heading))
+    reach = np.stack([long * cos + HALF_WIDTH * sin, long * sin + HALF_WIDTH * cos], axis=1) + MARGIN
+    places = np.stack([x, y], axis=1)
+    return np.nanmin(places - reach, axis=0), np.nanmax(places + reach, axis=0)
 
 
 def _grid(low: FloatArray, high: FloatArray) -> str:

@@ -11,7 +11,7 @@ import pytest
 
 from koopcli.errors import InvalidValueError
 from koopcli.reproduction import ghosts
-from koopcli.reproduction.road import off_text, road
+from koopcli.reproduction.road import HALF_WIDTH, OVERHANG, off_text, road
 from koopcli.simulation.integrate import simulate
 from koopcli.vehicles.single_track import ForceInput
 
@@ -72,6 +72,19 @@ def test_a_prediction_that_is_lost_ends_and_says_when(plant):
     data = json.loads(re.search(r"<script[^>]*>(.*?)</script>", html)[1])
     assert [len(car) for car in data["cars"]] == [3 * len(x)] * 2
     assert data["off"][1][-1] is None
+
+
+def test_a_car_that_spins_stays_inside_the_drawing(plant):
+    x = np.tile([10.0, 0.0, 3.0], (60, 1))  # half a turn on a circle
+    shown = ghosts.Shown(tuple(ghosts.tracks(x, {"same": x}, 0.01)), 0.01, "a spin", plant.parameters)
+    left, top, width, height = map(float, re.search(r'viewBox="([^"]*)"', "".join(road(shown)))[1].split())
+    for east, north, heading in shown.tracks[0].path:
+        for along in (plant.parameters.l_f + OVERHANG, -plant.parameters.l_r - OVERHANG):
+            for across in (HALF_WIDTH, -HALF_WIDTH):
+                corner = east + along * np.cos(heading) - across * np.sin(heading)
+                assert left < corner < left + width
+                corner = north + along * np.sin(heading) + across * np.cos(heading)
+                assert top < -corner < top + height
 
 
 def test_the_true_car_drives_along_its_first_velocity(plant):
