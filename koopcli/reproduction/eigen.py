@@ -58,7 +58,8 @@ def pictures(experiment: Experiment) -> list[Picture]:
         ),
         Picture(
             draw("error-map", [headline]),
-            f"Error by initial state, {name}: its mean in a slice, and every test state as a ball, whose size and colour are its error.",
+            f"Error by initial state, {name}: its mean in a slice, and every test state as a ball, whose size and "
+            "colour are its error.",
             leads=True,
         ),
         Picture(
