@@ -44,8 +44,8 @@ def simulated(store: Path, settings: list[str]) -> Any:
 
 def prepare(work: Path) -> None:
     """A folder for each dataset: koop's store, and the same samples and basis for whoever knows numpy alone."""
-    from koopcli.koopman import edmd
     from koopcli.koopman.bases import Choice
+    from koopcli.koopman.edmd import fit as edmd
 
     test = simulated(work / "test", TEST)
     for name, settings in DATASETS.items():

@@ -15,9 +15,9 @@ import numpy as np
 import plain
 
 import koopcli
-from koopcli.koopman import edmd
 from koopcli.koopman.bases import Choice
-from koopcli.koopman.evaluation import evaluate, join
+from koopcli.koopman.edmd import fit as edmd
+from koopcli.koopman.scores.evaluation import evaluate, join
 
 ORDER = 7
 
@@ -123,7 +123,7 @@ def eigen_fit(store: Path):
     from scipy.spatial import ConvexHull  # noqa: F401
 
     from koopcli.config.settings import FitEigen
-    from koopcli.koopman.eigenfunctions import fit
+    from koopcli.koopman.eigen.fit import fit
     from koopcli.stages.fit_eigen import reading
 
     data = koopcli.load("simulate", store)
@@ -134,9 +134,9 @@ def eigen_fit(store: Path):
 
 def eigen_dense(store: Path):
     """A tenth of the trajectories and splines as one dense least squares: a hundredth of the unknowns' cost."""
-    from koopcli.koopman.modes import exponentials
-    from koopcli.koopman.rates import dmd_rates, lattice
-    from koopcli.koopman.thin_plate import draw_centres, thin_plate
+    from koopcli.koopman.bases.thin_plate import draw_centres, thin_plate
+    from koopcli.koopman.eigen.rates import dmd_rates, lattice
+    from koopcli.koopman.predictor.modes import exponentials
 
     data = koopcli.load("simulate", store)
     x = data.x[::10]
@@ -181,8 +181,8 @@ def _futures(nodes):
 def _looked_up(kind: str, nodes, queries):
     from scipy.sparse import csr_matrix
 
-    from koopcli.koopman.lookup import LOOKUPS
-    from koopcli.koopman.lookup.cloud import Cloud
+    from koopcli.koopman.eigen.lookup import LOOKUPS
+    from koopcli.koopman.eigen.lookup.cloud import Cloud
 
     numbers = np.arange(len(nodes))
     found = LOOKUPS[kind].make(Cloud(nodes, numbers, numbers, LOOKUPS[kind].neighbours or 1))

@@ -14,11 +14,11 @@ import numpy as np
 from koopcli.config.experiment import load_experiment
 from koopcli.config.samples import BoxSample, GridSample
 from koopcli.errors import InvalidValueError
-from koopcli.koopman import edmd
 from koopcli.koopman.bases import Choice
-from koopcli.koopman.evaluation import Evaluation, evaluate
-from koopcli.koopman.predictor import Predictor
-from koopcli.koopman.transitions import Transitions
+from koopcli.koopman.edmd import fit as edmd
+from koopcli.koopman.edmd.transitions import Transitions
+from koopcli.koopman.predictor.predictor import Predictor
+from koopcli.koopman.scores.evaluation import Evaluation, evaluate
 from koopcli.records import FloatArray, Sample, Trajectories
 from koopcli.simulation import sampling
 from koopcli.simulation.integrate import simulate

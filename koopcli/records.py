@@ -18,6 +18,7 @@ from koopcli.errors import InvalidValueError
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
+IndexArray = npt.NDArray[np.intp]
 Meta = dict[str, Any]  # what JSON can hold
 
 

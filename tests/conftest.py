@@ -14,9 +14,9 @@ import pytest
 from koopcli.__main__ import main
 from koopcli.checks import COMMAND_LINE
 from koopcli.config.data import locate
-from koopcli.koopman import eigenfunctions
-from koopcli.koopman.predictor import Predictor
-from koopcli.koopman.rates import Spectrum
+from koopcli.koopman.eigen import fit as eigenfunctions
+from koopcli.koopman.eigen.rates import Spectrum
+from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.records import Sample, Trajectories
 from koopcli.simulation import sampling
 from koopcli.simulation.integrate import simulate

@@ -12,10 +12,10 @@ import koopcli
 from koopcli import content, stages, store
 from koopcli.blocks import Joined
 from koopcli.content import Content
-from koopcli.koopman import edmd
+from koopcli.koopman import stored
 from koopcli.koopman.bases import Choice
-from koopcli.koopman.evaluation import evaluate
-from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.edmd import fit as edmd
+from koopcli.koopman.scores.evaluation import evaluate
 from tests.conftest import box_sample, grid_sample, trajectories_of
 
 
@@ -100,7 +100,7 @@ def test_records_of_every_day_in_three_lines(plant):
         "Predictor: linear, 64 functions (Polynomial), steps of 0.01 s\n  states v_x (m/s)"
     )
     assert "spectral_radius" not in vars(predictor)  # which costs as much as a small fit
-    again = Predictor.unpack(replace(predictor).pack())
+    again = stored.predictor(replace(predictor).pack())
     assert "spectral radius 1.0" in repr(again)
     assert again == predictor
     assert replace(again, A=again.A + 1e-15) != predictor

@@ -9,11 +9,11 @@ from competitor import Competitor
 from samples import Samples
 
 import koopcli
-from koopcli.koopman import edmd
 from koopcli.koopman.bases import Choice
-from koopcli.koopman.passes import here
-from koopcli.koopman.survey import survey
-from koopcli.koopman.transitions import Transitions
+from koopcli.koopman.edmd import fit as edmd
+from koopcli.koopman.edmd.passes import here
+from koopcli.koopman.edmd.survey import survey
+from koopcli.koopman.edmd.transitions import Transitions
 
 
 class Koop(Competitor):

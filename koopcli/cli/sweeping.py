@@ -30,7 +30,7 @@ from koopcli.errors import InvalidValueError, KoopError, UsageError
 
 if TYPE_CHECKING:
     from koopcli.config.pictures import ImageFormat
-    from koopcli.koopman.swept import Swept
+    from koopcli.koopman.scores.swept import Swept
     from koopcli.stages.base import Task
     from koopcli.stages.grid import Cell
     from koopcli.stages.pipeline import Artefact

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from koopcli.figures.drawing import Source, column, state_columns, with_error
-from koopcli.koopman.evaluation import Evaluation
+from koopcli.koopman.scores.evaluation import Evaluation
 from koopcli.records import Array, Channels, FloatArray
 
 LARGEST_SHOWN = 0.98  # quantile of the errors where the colours end

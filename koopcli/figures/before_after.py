@@ -16,7 +16,7 @@ from koopcli.figures.balls import LARGEST_SHOWN
 from koopcli.figures.colours import SHADES
 from koopcli.figures.drawing import LOST, Source, column, state_columns, with_error
 from koopcli.figures.style import COLUMN, axis_label, plain, plain_numbers, style
-from koopcli.koopman.evaluation import Evaluation
+from koopcli.koopman.scores.evaluation import Evaluation
 from koopcli.records import Array, Channels, FloatArray
 
 LEAST = 0.02  # quantile of all errors where the colours begin

@@ -14,7 +14,7 @@ from koopcli.figures.balls import Balls, balls, columns
 from koopcli.figures.colours import SHADES, TRAINING
 from koopcli.figures.drawing import Source, column, state_columns
 from koopcli.figures.style import COLUMN, axis_label, legend_below, style
-from koopcli.koopman.coverage import spread
+from koopcli.koopman.predictor.coverage import spread
 from koopcli.records import Array, FloatArray, Trajectories
 
 PATHS, STARTS = 500, 20_000  # training trajectories, or states of single steps, drawn at most

@@ -14,7 +14,7 @@ from koopcli.errors import InvalidValueError
 from koopcli.figures.colours import MARKERS
 from koopcli.figures.drawing import Source, column
 from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
-from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.records import Array, FloatArray
 
 

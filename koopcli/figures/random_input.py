@@ -13,8 +13,8 @@ from koopcli.errors import InvalidValueError
 from koopcli.figures.colours import COLOURS, GUIDE
 from koopcli.figures.drawing import Source, column, state_columns
 from koopcli.figures.style import COLUMN, axis_label, style
-from koopcli.koopman.metrics import rmse
-from koopcli.koopman.restarts import restarted
+from koopcli.koopman.scores.metrics import rmse
+from koopcli.koopman.scores.restarts import restarted
 from koopcli.records import Array, Channels, FloatArray, Trajectories
 
 MARKED = 15  # restarts that are marked by lines; more would hide what is drawn

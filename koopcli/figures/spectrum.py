@@ -14,8 +14,8 @@ from koopcli.config.pictures import Plot
 from koopcli.figures.colours import COLOURS, GUIDE
 from koopcli.figures.drawing import Source, column
 from koopcli.figures.style import COLUMN, legend_below, style
-from koopcli.koopman.modes import ComplexArray, Modes
-from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.predictor.modes import ComplexArray, Modes
+from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.records import Array, FloatArray
 
 ROUNDING = 1e-9  # of an eigenvalue: one that is 1 neither grows nor decays

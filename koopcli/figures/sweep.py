@@ -14,7 +14,7 @@ from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
 from koopcli.figures.drawing import Source, column
 from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
-from koopcli.koopman.swept import REPEATS, Swept
+from koopcli.koopman.scores.swept import REPEATS, Swept
 from koopcli.records import Array, FloatArray
 
 MOST = 12  # curves that can be told apart

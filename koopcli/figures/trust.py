@@ -13,8 +13,8 @@ from koopcli.errors import InvalidValueError
 from koopcli.figures.colours import COLOURS, GUIDE
 from koopcli.figures.drawing import Source, column, with_error
 from koopcli.figures.style import COLUMN, legend_below, plain_numbers, style
-from koopcli.koopman.evaluation import Evaluation
-from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.predictor.predictor import Predictor
+from koopcli.koopman.scores.evaluation import Evaluation
 from koopcli.records import Array, FloatArray
 
 SMALLEST = 1e-6  # percent: what is drawn of an error of nothing

@@ -10,7 +10,7 @@ import numpy as np
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.samples import BallSample, EllipsoidSample
-from koopcli.koopman.trust import LEVEL
+from koopcli.koopman.predictor.trust import LEVEL
 from koopcli.reproduction import beyond_cells as blocks
 from koopcli.reproduction import headlines
 from koopcli.reproduction.eigen import FOREIGN

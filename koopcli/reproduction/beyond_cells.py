@@ -10,7 +10,7 @@ from koopcli.config.experiment import Experiment
 from koopcli.config.samples import EllipsoidSample, GreedySample, SampleSettings
 from koopcli.config.settings import PAIRS, FitEdmd, FitEigen
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.rates import lattice_size
+from koopcli.koopman.eigen.rates import lattice_size
 from koopcli.reproduction.eigen_cells import CUT, surface
 from koopcli.stages import recipes
 from koopcli.stages.base import Task

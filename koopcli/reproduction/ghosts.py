@@ -10,7 +10,7 @@ import numpy as np
 
 from koopcli.config.experiment import Experiment
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.frames import yaw
+from koopcli.koopman.eigen.frames import yaw
 from koopcli.records import FloatArray
 from koopcli.reproduction import edmd_cells
 from koopcli.reproduction.report import Race

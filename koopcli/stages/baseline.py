@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from koopcli.checks import build
 from koopcli.config.settings import Baseline
-from koopcli.koopman.baselines import Forecast
-from koopcli.koopman.edmd import coverage
+from koopcli.koopman.edmd.fit import coverage
+from koopcli.koopman.scores.baselines import Forecast
 from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task
 from koopcli.stages.usable import finished
 

@@ -10,8 +10,8 @@ from koopcli.blocks import blocks
 from koopcli.checks import build
 from koopcli.config.settings import Evaluate
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.evaluation import Evaluation, evaluate, join, shortest_prediction
-from koopcli.koopman.predictor import check_horizon
+from koopcli.koopman.predictor.predictor import check_horizon
+from koopcli.koopman.scores.evaluation import Evaluation, evaluate, join, shortest_prediction
 from koopcli.progress import Progress, within
 from koopcli.records import Meta, Packed
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory

@@ -9,16 +9,17 @@ from koopcli.checks import build
 from koopcli.config.samples import GridSample
 from koopcli.config.settings import OF_BASIS, FitEdmd, Simulate
 from koopcli.errors import InvalidValueError
-from koopcli.koopman import edmd
+from koopcli.koopman import stored
 from koopcli.koopman.bases import BASES, Basis, Choice
-from koopcli.koopman.blockwise import PASSES
-from koopcli.koopman.coverage import coverage_of
-from koopcli.koopman.passes import Found, Pass, pack_found, unpack_found
-from koopcli.koopman.polynomial import FAMILIES
-from koopcli.koopman.predictor import Predictor
-from koopcli.koopman.survey import Survey, survey
-from koopcli.koopman.thin_plate import ThinPlate
-from koopcli.koopman.transitions import Transitions
+from koopcli.koopman.bases.polynomial import FAMILIES
+from koopcli.koopman.bases.thin_plate import ThinPlate
+from koopcli.koopman.edmd import fit as edmd
+from koopcli.koopman.edmd.blockwise import PASSES
+from koopcli.koopman.edmd.passes import Found, Pass, pack_found, unpack_found
+from koopcli.koopman.edmd.survey import Survey, survey
+from koopcli.koopman.edmd.transitions import Transitions
+from koopcli.koopman.predictor.coverage import coverage_of
+from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.progress import Progress
 from koopcli.records import Meta, Packed
 from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task
@@ -231,7 +232,7 @@ STAGE = Stage(
     version=4,
     settings=lambda values: build(FitEdmd, values),
     run=_run,
-    unpack=Predictor.unpack,
+    unpack=stored.predictor,
     figures=figures,
     describe=_describe,
     check=_check,

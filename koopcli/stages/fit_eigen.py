@@ -9,16 +9,17 @@ import numpy as np
 from koopcli.checks import build
 from koopcli.config.settings import PAIRS, FitEigen
 from koopcli.errors import InvalidValueError
-from koopcli.koopman import eigenfunctions
-from koopcli.koopman.eigenfunctions import Reading
-from koopcli.koopman.frames import check_frame
-from koopcli.koopman.futures import Futures
-from koopcli.koopman.metrics import summary
-from koopcli.koopman.modes import Modes
-from koopcli.koopman.predictor import Predictor
-from koopcli.koopman.rates import Spectrum
-from koopcli.koopman.recurrence import Surface, check_recurrence, check_starts
-from koopcli.koopman.tabulated import Tabulated
+from koopcli.koopman import stored
+from koopcli.koopman.eigen import fit as eigenfunctions
+from koopcli.koopman.eigen.fit import Reading
+from koopcli.koopman.eigen.frames import check_frame
+from koopcli.koopman.eigen.futures import Futures
+from koopcli.koopman.eigen.rates import Spectrum
+from koopcli.koopman.eigen.recurrence import Surface, check_recurrence, check_starts
+from koopcli.koopman.eigen.tabulated import Tabulated
+from koopcli.koopman.predictor.modes import Modes
+from koopcli.koopman.predictor.predictor import Predictor
+from koopcli.koopman.scores.metrics import summary
 from koopcli.records import FloatArray, Meta, Trajectories
 from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task, refuse_beyond_memory
 from koopcli.stages.predictors import figures, regression, size
@@ -192,7 +193,7 @@ STAGE = Stage(
     version=2,
     settings=lambda values: build(FitEigen, values),
     run=_run,
-    unpack=Predictor.unpack,
+    unpack=stored.predictor,
     figures=_figures,
     describe=_describe,
     check=_check,

@@ -14,7 +14,7 @@ from koopcli.config.sampled import INPUTS
 from koopcli.config.samples import BoxSample, PointSample
 from koopcli.config.settings import PAIRS, FitEigen
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.rates import lattice_size
+from koopcli.koopman.eigen.rates import lattice_size
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 from koopcli.stages.makers import outlook

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from koopcli.koopman.predictor import Predictor
+from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.records import Meta
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from koopcli.checks import build
 from koopcli.config.settings import Sweep
-from koopcli.koopman.evaluation import Evaluation
-from koopcli.koopman.swept import Swept, swept
+from koopcli.koopman.scores.evaluation import Evaluation
+from koopcli.koopman.scores.swept import Swept, swept
 from koopcli.records import Meta
 from koopcli.stages.base import Context, Cost, Inputs, Stage
 

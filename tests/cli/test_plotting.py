@@ -9,7 +9,7 @@ import pytest
 
 from koopcli.config.data import data_folder
 from koopcli.figures.registry import FIGURES
-from koopcli.koopman import metrics
+from koopcli.koopman.scores import metrics
 from tests.cli.test_errors import one_line
 
 SHORT = ("error-map", "orders", "random-input", "spectrum")  # one of each kind of what figures take

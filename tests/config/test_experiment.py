@@ -15,12 +15,12 @@ from koopcli.config.samples import SAMPLES, BoxSample, GridSample
 from koopcli.config.settings import About, Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError, UsageError
 from koopcli.figures.registry import FIGURES
-from koopcli.koopman.baselines import FORECASTS
 from koopcli.koopman.bases import BASES
-from koopcli.koopman.frames import FRAMES
-from koopcli.koopman.lookup import LOOKUPS
-from koopcli.koopman.rates import RATES
-from koopcli.koopman.thin_plate import PLACEMENTS
+from koopcli.koopman.bases.thin_plate import PLACEMENTS
+from koopcli.koopman.eigen.frames import FRAMES
+from koopcli.koopman.eigen.lookup import LOOKUPS
+from koopcli.koopman.eigen.rates import RATES
+from koopcli.koopman.scores.baselines import FORECASTS
 from koopcli.simulation.manoeuvres import MANOEUVRES
 from koopcli.simulation.sampling import DRAWS, MESHES
 from koopcli.stages.makers import LIFTED

@@ -12,10 +12,10 @@ from koopcli.errors import InvalidValueError
 from koopcli.figures import orders, random_input, spectrum
 from koopcli.figures.drawing import Source
 from koopcli.figures.orders import OrderErrors
-from koopcli.koopman import edmd
 from koopcli.koopman.bases import Choice
-from koopcli.koopman.modes import Modes
-from koopcli.koopman.restarts import restarted
+from koopcli.koopman.edmd import fit as edmd
+from koopcli.koopman.predictor.modes import Modes
+from koopcli.koopman.scores.restarts import restarted
 from koopcli.records import Trajectories
 from tests.stages.toys import _looked_up, _predictor, _trajectories, figure_records, figure_settings
 
@@ -170,7 +170,7 @@ def test_random_input_takes_any_predictor(plant):
 
 
 def grid_of(names, values, places, mean):
-    from koopcli.koopman.swept import SCORES, Swept
+    from koopcli.koopman.scores.swept import SCORES, Swept
 
     mean = np.asarray(mean, dtype=float)
     return Swept(tuple(names), tuple(map(tuple, values)), np.array(places), dict.fromkeys([*SCORES, "functions"], mean))

@@ -22,9 +22,9 @@ from koopcli.figures import (
 )
 from koopcli.figures.drawing import Source
 from koopcli.figures.ends import apart
-from koopcli.koopman import edmd
 from koopcli.koopman.bases import Choice
-from koopcli.koopman.evaluation import evaluate
+from koopcli.koopman.edmd import fit as edmd
+from koopcli.koopman.scores.evaluation import evaluate
 from koopcli.records import Sample
 from koopcli.simulation import sampling
 from koopcli.vehicles.single_track import SlipInput

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from koopcli.config.data import locate
-from koopcli.koopman.eigenfunctions import with_images
-from koopcli.koopman.metrics import rmse
+from koopcli.koopman.eigen.fit import with_images
+from koopcli.koopman.scores.metrics import rmse
 from koopcli.simulation import designs, sampling
 from koopcli.simulation.integrate import simulate
 from koopcli.vehicles.parameters import read_vehicle

@@ -14,7 +14,7 @@ from PIL import Image
 
 from koopcli.figures.drawing import Drawing
 from koopcli.figures.registry import FIGURES, drawing
-from koopcli.koopman import metrics
+from koopcli.koopman.scores import metrics
 from koopcli.reproduction.illustrations import Illustration
 from koopcli.reproduction.images import address, shrunk
 from koopcli.reproduction.opening import Opening

@@ -9,7 +9,7 @@ import pytest
 from koopcli.config.changes import parse_set
 from koopcli.config.experiment import load_experiment
 from koopcli.errors import DamagedArtefactError, NewerFormatError, UnknownNameError
-from koopcli.koopman import evaluation
+from koopcli.koopman.scores import evaluation
 from koopcli.progress import silent
 from koopcli.records import Array, Packed
 from koopcli.stages import read, recipes

@@ -86,7 +86,7 @@ def test_a_changed_result_without_a_changed_version_is_found(calm, monkeypatch):
 
 def test_a_changed_figure_is_found_too(pins, monkeypatch):
     """What scripts read is pinned as well as the arrays."""
-    from koopcli.koopman import operators
+    from koopcli.koopman.edmd import operators
 
     monkeypatch.setattr(operators, "condition_number", lambda values: 2.0 * values.max() / values.min())
     assert "raise its version" in complaint("fit-edmd", pins, made("fit-edmd"))

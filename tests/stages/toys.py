@@ -20,17 +20,17 @@ from koopcli.config.samples import BallSample, BoxSample, EllipsoidSample, Greed
 from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Simulate, Sweep, SweepAxis
 from koopcli.config.shipped import fingerprint, used_by
 from koopcli.figures.registry import FIGURES
-from koopcli.koopman.baselines import Forecast
-from koopcli.koopman.coverage import Coverage
-from koopcli.koopman.evaluation import Evaluation
-from koopcli.koopman.modes import Modes
-from koopcli.koopman.nodes import Search, nodes_of
-from koopcli.koopman.orthonormal import OrthonormalPolynomials
-from koopcli.koopman.polynomial import Polynomial
-from koopcli.koopman.predictor import Predictor
-from koopcli.koopman.swept import SCORES, Swept
-from koopcli.koopman.tabulated import Tabulated
-from koopcli.koopman.trust import Trust
+from koopcli.koopman.bases.orthonormal import OrthonormalPolynomials
+from koopcli.koopman.bases.polynomial import Polynomial
+from koopcli.koopman.eigen.nodes import Search, nodes_of
+from koopcli.koopman.eigen.tabulated import Tabulated
+from koopcli.koopman.predictor.coverage import Coverage
+from koopcli.koopman.predictor.modes import Modes
+from koopcli.koopman.predictor.predictor import Predictor
+from koopcli.koopman.predictor.trust import Trust
+from koopcli.koopman.scores.baselines import Forecast
+from koopcli.koopman.scores.evaluation import Evaluation
+from koopcli.koopman.scores.swept import SCORES, Swept
 from koopcli.progress import silent
 from koopcli.records import Meta, Packed, Sample, Trajectories
 from koopcli.simulation.manoeuvres import MANOEUVRES

@@ -1,0 +1,1 @@
+"""Eigenfunctions built from trajectories: rates, values on a boundary, tables, lookups (docs/equations.md 7)."""

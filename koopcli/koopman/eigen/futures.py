@@ -1,0 +1,118 @@
+"""Lifted states from what followed nearby samples, over the horizon and no further (docs/equations.md 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+
+from koopcli.content import Content
+from koopcli.koopman.eigen.frames import FRAMES
+from koopcli.koopman.eigen.nodes import Nodes
+from koopcli.koopman.predictor.lifts import Observed
+from koopcli.koopman.predictor.modes import Modes
+from koopcli.records import Array, FloatArray, IndexArray, Packed
+
+TOGETHER = 4096  # states lifted at once
+LARGEST_TABLE = 3e8  # bytes of what follows all nodes; a larger one is not made
+GATHERED = 128  # states whose nodes' futures are then put together at once
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Futures(Content):
+    """ψ(x): the exponentials that fit the interpolated future of x best (7.16).
+
+    ``trajectories`` (J, samples, n_x); ``nodes``: those of their samples that are looked up; ``frame``: in which what
+    follows them is interpolated; ``projection`` (L, horizon + 1): from the samples of a future to the states of a
+    block of ``modes``, of which each state of the plant has one.
+    """
+
+    trajectories: FloatArray
+    nodes: Nodes
+    frame: str
+    projection: FloatArray
+    modes: Modes
+
+    kind = "futures"
+
+    @property
+    def functions(self) -> int:
+        """Dimension N of the lifted state."""
+        return len(self.modes)
+
+    def future(self, x: FloatArray) -> FloatArray:
+        """What follows the states ``x`` (n, n_x), interpolated: (n, horizon + 1, n_x). The first sample is x."""
+        n, samples, n_x = len(x), self.projection.shape[1], x.shape[1]
+        out = np.empty((n, samples, n_x))
+        frame = FRAMES[self.frame]
+        for start in range(0, n, TOGETHER):
+            here = x[start : start + TOGETHER]
+            seen = self._combined(here).reshape(len(here), samples, n_x)
+            out[start : start + TOGETHER] = frame.back(seen, here, self.modes.dt)
+        return out
+
+    def lift(self, x: FloatArray) -> FloatArray:
+        """ψ(x) (n, N) of the states (n, n_x)."""
+        blocks = np.matmul(self.projection, self.future(x))  # (n, L, n_x)
+        return np.asarray(blocks.transpose(0, 2, 1).reshape(len(x), self.functions))
+
+    def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
+        """rows · ψ(x) as (n, R), for ``rows`` (R, N)."""
+        return self.lift(x) @ rows.T
+
+    def onto(self, rows: FloatArray) -> Observed:
+        """The function of ``x`` (n, n_x) that observes ``rows`` (R, N)."""
+        return partial(self.observe, rows=rows)
+
+    def _combined(self, x: FloatArray) -> FloatArray:
+        """The weighted sums of the nodes' futures, (n, samples · n_x)."""
+        from scipy.sparse import csr_matrix  # noqa: PLC0415  (what only reads a predictor goes without)
+
+        indices, weights = self.nodes.find(x)
+        if self._table_bytes > LARGEST_TABLE:
+            return self._gathered(indices, weights)
+        ends = np.arange(len(x) + 1) * indices.shape[1]
+        table = csr_matrix((weights.ravel(), indices.ravel(), ends), shape=(len(x), len(self._values)))
+        return np.asarray(table @ self._values)
+
+    def _gathered(self, indices: IndexArray, weights: FloatArray) -> FloatArray:
+        """The same where a table of all nodes would be too large: what follows those that are found."""
+        found = np.empty((len(indices), self.projection.shape[1] * self.trajectories.shape[2]))
+        for start in range(0, len(indices), GATHERED):
+            rows = slice(start, start + GATHERED)
+            values = self._values_of(indices[rows].ravel()).reshape(*indices[rows].shape, -1)
+            found[rows] = np.matmul(weights[rows, np.newaxis], values)[:, 0]
+        return found
+
+    @property
+    def _table_bytes(self) -> float:
+        return 8.0 * len(self.nodes.kept) * float(self.projection.shape[1] * self.trajectories.shape[2])
+
+    @cached_property
+    def _values(self) -> FloatArray:
+        """What follows every node, in the frame, (nodes, samples · n_x)."""
+        return self._values_of(np.arange(len(self.nodes.kept)))
+
+    def _values_of(self, nodes: IndexArray) -> FloatArray:
+        """What follows some ``nodes`` (m,), (m, samples · n_x)."""
+        j, k = self.nodes.trajectory[nodes], self.nodes.sample[nodes]
+        ahead = self.trajectories[j[:, np.newaxis], k[:, np.newaxis] + np.arange(self.projection.shape[1])]
+        return np.asarray(FRAMES[self.frame].seen(ahead, self.modes.dt).reshape(len(j), -1))
+
+    def pack(self) -> Packed:
+        """Trajectories, nodes and projection."""
+        nodes = self.nodes.pack()
+        arrays = {
+            "trajectories": Array(self.trajectories, ("trajectory", "sample", "state"), "those of the state"),
+            "projection": Array(self.projection, ("state of a block", "sample"), "1"),
+            **nodes.arrays,
+        }
+        return Packed(arrays, {"kind": self.kind, "frame": self.frame, "search": nodes.meta})
+
+    @classmethod
+    def unpack(cls, packed: Packed, modes: Modes) -> Futures:
+        """The inverse of :meth:`pack`."""
+        trajectories = packed.arrays["trajectories"].values[...]
+        nodes = Nodes.unpack(Packed(packed.arrays, packed.meta["search"]), trajectories)
+        return cls(trajectories, nodes, packed.meta["frame"], packed.arrays["projection"].values[...], modes)

@@ -1,0 +1,45 @@
+"""Moving least squares: a linear function of the place, fitted afresh around every place (docs/equations.md 7)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from koopcli.koopman.eigen.lookup.cloud import Cloud
+from koopcli.records import FloatArray, IndexArray
+
+WIDTH = 0.6  # of the Gaussian weights, over the distance to the farthest neighbour
+RIDGE = 1e-3  # on the slopes, over the sum of the weights
+TINY = 1e-12
+
+
+class MovingLeastSquares:
+    """The value at a place of the linear function that fits the ``neighbours`` nearest nodes best, near ones more.
+
+    Smooth, and blind to nodes' values but for their trend: nodes are not met exactly.
+    """
+
+    def __init__(self, nodes: Cloud) -> None:
+        self._nodes = nodes
+
+    def __call__(self, y: FloatArray) -> tuple[IndexArray, FloatArray]:
+        """The neighbours (n, q) of each of ``y`` (n, n_x) and what each of their values counts."""
+        found = self._nodes.near(y)
+        return found, trend_weights(self._nodes.places[found] - y[:, np.newaxis])
+
+
+def trend_weights(near: FloatArray) -> FloatArray:
+    """The weights (n, q) of values at nodes ``near`` (n, q, n_x), for the value at zero of their linear trend (7.18).
+
+    Slopes are held a little, so that a direction in which the nodes do not differ has none.
+    """
+    distance = np.linalg.norm(near, axis=2)
+    width = WIDTH * distance.max(axis=1, keepdims=True) + TINY
+    weight = np.exp(-((distance / width) ** 2))
+    terms = np.concatenate([np.ones((*distance.shape, 1)), near / width[..., np.newaxis]], axis=2)
+    weighted = terms * weight[..., np.newaxis]
+    gram = np.matmul(weighted.transpose(0, 2, 1), terms)
+    slopes = np.diag([0.0] + [1.0] * near.shape[2])
+    gram += RIDGE * weight.sum(axis=1)[:, np.newaxis, np.newaxis] * slopes
+    constant = np.zeros((*gram.shape[:2], 1))
+    constant[:, 0] = 1.0
+    return np.asarray(np.matmul(weighted, np.linalg.solve(gram, constant))[..., 0])

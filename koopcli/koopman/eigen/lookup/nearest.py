@@ -1,0 +1,19 @@
+"""The nearest node alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from koopcli.koopman.eigen.lookup.cloud import Cloud
+from koopcli.records import FloatArray, IndexArray
+
+
+class Nearest:
+    """The node nearest to a place, (7.6)."""
+
+    def __init__(self, nodes: Cloud) -> None:
+        self._nodes = nodes
+
+    def __call__(self, y: FloatArray) -> tuple[IndexArray, FloatArray]:
+        """Index (n, 1) and weight one for each of ``y`` (n, n_x)."""
+        return self._nodes.near(y), np.ones((len(y), 1))

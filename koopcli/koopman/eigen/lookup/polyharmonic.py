@@ -1,0 +1,92 @@
+"""Local polyharmonic splines: r³ on the nearest nodes, and a quadratic (docs/equations.md 7)."""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement
+
+import numpy as np
+
+from koopcli.koopman.eigen.lookup.cloud import Cloud
+from koopcli.koopman.eigen.lookup.mls import trend_weights
+from koopcli.records import BoolArray, FloatArray, IndexArray
+
+TOGETHER = 256  # places solved for at once
+STIFF = 1e-9  # softness of a spline that meets its nodes
+LARGEST = 10.0  # sum of absolute weights, beyond which a simpler spline is taken
+SIMPLER = ((1, STIFF), (1, 1e-4), (1, 1e-2))  # degree and softness, one after the other
+
+
+class Polyharmonic:
+    """The spline of r³ with a quadratic tail through the neighbours of a place, read there.
+
+    Meets the nodes' values, and those of any quadratic function everywhere. Distances are divided by that of the
+    farthest neighbour, which keeps every small system alike. Where neighbours lie nearly in a plane or on a line, the
+    weights grow far beyond one and with them every error of the nodes: such a place has a linear tail instead, then a
+    softer spline, and in the end no more than the trend of its neighbours.
+    """
+
+    def __init__(self, nodes: Cloud) -> None:
+        self._nodes = nodes
+
+    def __call__(self, y: FloatArray) -> tuple[IndexArray, FloatArray]:
+        """The neighbours (n, q) of each of ``y`` (n, n_x) and what each of their values counts."""
+        found = self._nodes.near(y)
+        weights = np.empty(found.shape)
+        for start in range(0, len(y), TOGETHER):
+            rows = slice(start, start + TOGETHER)
+            way = self._nodes.places[found[rows]] - y[rows, np.newaxis]
+            size = np.sqrt((way**2).sum(axis=2).max(axis=1))
+            weights[rows] = _bounded(way / np.maximum(size, np.finfo(float).tiny)[:, np.newaxis, np.newaxis])
+        return found, weights
+
+
+def _bounded(near: FloatArray) -> FloatArray:
+    """The weights (n, q), simpler where they would be large."""
+    weights = spline_weights(near, 2, STIFF)
+    wild = np.flatnonzero(_wild(weights))
+    for degree, softness in SIMPLER:
+        if not len(wild):
+            break
+        weights[wild] = spline_weights(near[wild], degree, softness)
+        wild = wild[_wild(weights[wild])]
+    weights[wild] = trend_weights(near[wild])
+    return weights
+
+
+def _wild(weights: FloatArray) -> BoolArray:
+    return ~np.asarray(np.abs(weights).sum(axis=1) <= LARGEST)
+
+
+def spline_weights(near: FloatArray, degree: int, softness: float) -> FloatArray:
+    """The weights (n, q) of values at nodes ``near`` (n, q, n_x), for the value at zero, eq. (7.19).
+
+    Solves [Φ + softness P; Pᵀ 0] [w; ·] = [φ; p] with Φ = |y_i - y_j|³, P the monomials to ``degree`` one or two, φ and
+    p those of zero.
+    """
+    n, q = near.shape[:2]
+    square = (near**2).sum(axis=2)
+    between = square[:, :, np.newaxis] + square[:, np.newaxis] - 2 * np.matmul(near, near.transpose(0, 2, 1))
+    np.maximum(between, 0.0, out=between)
+    between *= np.sqrt(between)
+    tail = _monomials(near, degree)
+    m = tail.shape[2]
+    system = np.zeros((n, q + m, q + m))
+    system[:, :q, :q] = between
+    system[:, :q, q:] = tail
+    system[:, q:, :q] = tail.transpose(0, 2, 1)
+    diagonal = np.arange(q + m)
+    system[:, diagonal[:q], diagonal[:q]] = softness
+    system[:, diagonal[q:], diagonal[q:]] = -1e-3 * STIFF  # a tail that the nodes leave open is not used
+    right = np.zeros((n, q + m, 1))
+    right[:, :q, 0] = square * np.sqrt(square)
+    right[:, q, 0] = 1.0
+    return np.asarray(np.linalg.solve(system, right)[:, :q, 0])
+
+
+def _monomials(near: FloatArray, degree: int) -> FloatArray:
+    """Monomials of ``near`` (n, q, n_x) to ``degree`` one or two, the constant first."""
+    first = [np.ones(near.shape[:2]), *near.transpose(2, 0, 1)]
+    if degree == 1:
+        return np.stack(first, axis=2)
+    pairs = combinations_with_replacement(range(near.shape[2]), 2)
+    return np.stack([*first, *(near[:, :, i] * near[:, :, j] for i, j in pairs)], axis=2)

@@ -1,0 +1,1 @@
+"""What a fit gives: lift, dynamics, output, and where the data lie."""

@@ -1,0 +1,1 @@
+"""How good a predictor is: errors, baselines, evaluations."""

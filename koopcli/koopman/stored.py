@@ -1,0 +1,27 @@
+"""Predictors as they are read back from a store: every kind of lift by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from koopcli.koopman.bases import STORED
+from koopcli.koopman.eigen.futures import Futures
+from koopcli.koopman.eigen.tabulated import Tabulated
+from koopcli.koopman.predictor.lifts import Lift
+from koopcli.koopman.predictor.predictor import Predictor, UnpackLift
+from koopcli.records import Packed
+
+
+def _of_basis(unpack: Callable[[Packed], Lift]) -> UnpackLift:
+    return lambda packed, _: unpack(packed)
+
+
+LIFTS: dict[str, UnpackLift] = {
+    **{kind: _of_basis(unpack) for kind, unpack in STORED.items()},
+    **{table.kind: table.unpack for table in (Tabulated, Futures)},  # which their modes carry on
+}
+
+
+def predictor(packed: Packed) -> Predictor:
+    """The inverse of ``Predictor.pack``."""
+    return Predictor.unpack(packed, LIFTS)
