@@ -32,7 +32,7 @@ def fit_product(store: Path):
     yield
     basis = edmd.basis_from_data(data, Choice("tensor", ORDER))
     predictor = edmd.fit(data, basis)
-    yield float(np.abs(predictor.A).sum())
+    yield float(np.abs(predictor.dynamics.A).sum())
 
 
 def fit_blocks(store: Path):
@@ -44,13 +44,13 @@ def fit_blocks(store: Path):
     yield
     basis = edmd.basis_from_data(data, Choice("tensor", ORDER))
     predictor = edmd.fit(data, basis)
-    yield float(np.abs(predictor.A).sum())
+    yield float(np.abs(predictor.dynamics.A).sum())
 
 
 def fit_bilinear(store: Path):
     data = koopcli.load("simulate", store)
     yield
-    yield float(np.abs(_bilinear(data).N).sum())
+    yield float(np.abs(_bilinear(data).dynamics.N).sum())
 
 
 def fit_bilinear_blocks(store: Path):
@@ -60,7 +60,7 @@ def fit_bilinear_blocks(store: Path):
 
     data = replace(koopcli.load("simulate", store), product=None)
     yield
-    yield float(np.abs(_bilinear(data).N).sum())
+    yield float(np.abs(_bilinear(data).dynamics.N).sum())
 
 
 def _bilinear(data):
@@ -85,7 +85,11 @@ def bilinear_loop(store: Path):
     for start, inputs in zip(predictor.lift(x0), u, strict=True):
         z = start
         for now in inputs:
-            z = predictor.A @ z + predictor.B @ now + sum(v * (N @ z) for v, N in zip(now, predictor.N, strict=True))
+            z = (
+                predictor.dynamics.A @ z
+                + predictor.dynamics.B @ now
+                + sum(v * (N @ z) for v, N in zip(now, predictor.dynamics.N, strict=True))
+            )
             total += float(np.abs(predictor.C @ z).sum())
     yield total
 
@@ -129,7 +133,7 @@ def eigen_fit(store: Path):
     data = koopcli.load("simulate", store)
     yield
     predictor = fit(data, reading(FitEigen().settled(), data.steps, data.dt))
-    yield float(predictor.rank)
+    yield float(predictor.regression.rank)
 
 
 def eigen_dense(store: Path):

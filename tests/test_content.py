@@ -15,6 +15,7 @@ from koopcli.content import Content
 from koopcli.koopman import stored
 from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
+from koopcli.koopman.predictor.dynamics.bilinear import Bilinear
 from koopcli.koopman.scores.evaluation import evaluate
 from tests.conftest import box_sample, grid_sample, trajectories_of
 
@@ -103,8 +104,9 @@ def test_records_of_every_day_in_three_lines(plant):
     again = stored.predictor(replace(predictor).pack())
     assert "spectral radius 1.0" in repr(again)
     assert again == predictor
-    assert replace(again, A=again.A + 1e-15) != predictor
-    bilinear = replace(predictor, N=np.zeros((4, 64, 64)), horizon=9)
+    assert replace(again, dynamics=replace(again.dynamics, A=again.dynamics.A + 1e-15)) != predictor
+    dynamics = Bilinear(predictor.dynamics.A, predictor.dynamics.B, np.zeros((4, 64, 64)))
+    bilinear = replace(predictor, dynamics=dynamics, horizon=9)
     assert repr(bilinear).startswith("Predictor: bilinear, 64 functions (Polynomial), steps of 0.01 s, 9 at most\n")
     test = trajectories_of(plant, box_sample(20), 5)
     scored = evaluate(predictor, test, slice(None), 1)

@@ -34,7 +34,7 @@ def select(sources: Sequence[Source], settings: Plot) -> list[ModeErrors]:
     for source in sources:
         predictor: Predictor = source.records["predictor"]
         mean = source.records["evaluation"].figures()["rmse"]["mean"]
-        missed = np.nan if predictor.missed is None else predictor.missed
+        missed = np.nan if predictor.regression.missed is None else predictor.regression.missed
         groups.setdefault(source.label, []).append((source.at or 0.0, missed, mean))
     found = [ModeErrors(label, *np.array(sorted(members)).T) for label, members in groups.items()]
     if not any(np.isfinite(one.mean).any() for one in found):

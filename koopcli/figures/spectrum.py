@@ -14,7 +14,8 @@ from koopcli.config.pictures import Plot
 from koopcli.figures.colours import COLOURS, GUIDE
 from koopcli.figures.drawing import Source, column
 from koopcli.figures.style import COLUMN, legend_below, style
-from koopcli.koopman.predictor.modes import ComplexArray, Modes
+from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
+from koopcli.koopman.predictor.modes import ComplexArray
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.records import Array, FloatArray
 
@@ -42,10 +43,11 @@ class Spectrum:
 def select(sources: Sequence[Source], settings: Plot) -> Spectrum:
     """What the figure shows."""
     predictor: Predictor = sources[0].records["predictor"]
-    if isinstance(predictor.A, Modes):
-        eigenvalues, rates, copies = predictor.A.eigenvalues, predictor.A.rates, predictor.A.copies
+    dynamics = predictor.dynamics
+    if isinstance(dynamics, Diagonal):
+        eigenvalues, rates, copies = dynamics.eigenvalues, dynamics.modes.rates, dynamics.modes.copies
     else:
-        eigenvalues = np.linalg.eigvals(predictor.A).astype(complex)
+        eigenvalues = dynamics.eigenvalues
         eigenvalues = eigenvalues[np.lexsort([eigenvalues.imag, eigenvalues.real])]
         with np.errstate(divide="ignore"):
             rates = np.log(np.abs(eigenvalues)) / predictor.dt + 1j * (np.angle(eigenvalues) / predictor.dt)

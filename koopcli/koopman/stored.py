@@ -7,7 +7,10 @@ from collections.abc import Callable
 from koopcli.koopman.bases import STORED
 from koopcli.koopman.eigen.futures import Futures
 from koopcli.koopman.eigen.tabulated import Tabulated
+from koopcli.koopman.predictor.dynamics import Dynamics
+from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
 from koopcli.koopman.predictor.lifts import Lift
+from koopcli.koopman.predictor.modes import Modes
 from koopcli.koopman.predictor.predictor import Predictor, UnpackLift
 from koopcli.records import Packed
 
@@ -16,9 +19,17 @@ def _of_basis(unpack: Callable[[Packed], Lift]) -> UnpackLift:
     return lambda packed, _: unpack(packed)
 
 
+def _of_modes(unpack: Callable[[Packed, Modes], Lift]) -> UnpackLift:
+    def table(packed: Packed, dynamics: Dynamics) -> Lift:
+        assert isinstance(dynamics, Diagonal), "a table is carried on by modes"
+        return unpack(packed, dynamics.modes)
+
+    return table
+
+
 LIFTS: dict[str, UnpackLift] = {
     **{kind: _of_basis(unpack) for kind, unpack in STORED.items()},
-    **{table.kind: table.unpack for table in (Tabulated, Futures)},  # which their modes carry on
+    **{table.kind: _of_modes(table.unpack) for table in (Tabulated, Futures)},
 }
 
 

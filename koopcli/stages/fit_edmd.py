@@ -46,23 +46,21 @@ def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
     _warn_of_centres(basis, seen, context)
     method = edmd.Method(settings.terms != "linear", settings.ridge, plain, settings.terms == "generator")
     predictor = edmd.fit(data, basis, method, context.progress, over, seen)
-    if predictor.rank < predictor.directions:
+    found = predictor.regression
+    if found.rank < found.directions:
         because = edmd.why_deficient(data, predictor, seen)
         context.warn(
-            f"the data determine {predictor.rank} of {predictor.directions} directions (condition "
-            f"{predictor.condition:.1e}){f' because {because}' if because else ''}; the others were set to zero: "
+            f"the data determine {found.rank} of {found.directions} directions (condition "
+            f"{found.condition:.1e}){f' because {because}' if because else ''}; the others were set to zero: "
             "sample more states or inputs, lower the order or the number of centres, or use a --ridge"
         )
-    elif plain and predictor.condition > HARMLESS:
+    elif plain and found.condition > HARMLESS:
         context.warn(
-            f"the normal equations of raw monomials have condition {predictor.condition:.1e}, squared: what this "
+            f"the normal equations of raw monomials have condition {found.condition:.1e}, squared: what this "
             "predictor shows is rounding as much as the method; use the solver 'orthonormal'"
         )
-    still = [
-        name
-        for i, name in enumerate(predictor.input_channels.names)
-        if not predictor.B[:, i].any() and (predictor.N is None or not predictor.N[i].any())
-    ]
+    acting = predictor.dynamics.acting
+    still = [name for name, acts in zip(predictor.input_channels.names, acting, strict=True) if not acts]
     if still:
         context.warn(
             f"{', '.join(still)} never moved in these data, so B is zero there: the predictor knows nothing of it; "
@@ -229,7 +227,7 @@ def _describe(figures: Meta, settings: FitEdmd) -> str:
 
 STAGE = Stage(
     name="fit-edmd",
-    version=4,
+    version=5,
     settings=lambda values: build(FitEdmd, values),
     run=_run,
     unpack=stored.predictor,

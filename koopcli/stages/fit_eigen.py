@@ -17,7 +17,6 @@ from koopcli.koopman.eigen.futures import Futures
 from koopcli.koopman.eigen.rates import Spectrum
 from koopcli.koopman.eigen.recurrence import Surface, check_recurrence, check_starts
 from koopcli.koopman.eigen.tabulated import Tabulated
-from koopcli.koopman.predictor.modes import Modes
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.koopman.scores.metrics import summary
 from koopcli.records import FloatArray, Meta, Trajectories
@@ -76,15 +75,15 @@ def _spectrum(s: FitEigen) -> Spectrum:
 
 
 def _figures(predictor: Predictor) -> Meta:
-    modes, lift, trust = predictor.A, predictor.observables, predictor.trust
-    assert isinstance(modes, Modes)
+    lift, trust = predictor.observables, predictor.trust
     assert isinstance(lift, (Tabulated, Futures))
+    modes = lift.modes
     return {
         **figures(predictor),
         "rates": modes.rates.real.tolist(),
         "frequencies": modes.rates.imag.tolist(),
         "modes": len(modes.rates),
-        "missed": predictor.missed,
+        "missed": predictor.regression.missed,
         "nodes": len(lift.nodes.kept),
         "beyond": f"predictions from outside the hull of the data {predictor.beyond}",
         "trust": None if trust is None else {"level": trust.level, **summary(trust.errors)},
@@ -190,7 +189,7 @@ def _estimate(task: Task) -> Cost:
 
 STAGE = Stage(
     name="fit-eigen",
-    version=2,
+    version=3,
     settings=lambda values: build(FitEigen, values),
     run=_run,
     unpack=stored.predictor,

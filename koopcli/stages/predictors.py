@@ -8,14 +8,15 @@ from koopcli.records import Meta
 
 def figures(predictor: Predictor) -> Meta:
     """The numbers of a fit that scripts read (`--json`)."""
+    found = predictor.regression
     return {
         "functions": predictor.functions,
-        "rank": predictor.rank,
-        "directions": predictor.directions,
-        "condition": predictor.condition,
+        "rank": found.rank,
+        "directions": found.directions,
+        "condition": found.condition,
         "spectral_radius": predictor.spectral_radius,
         "horizon": predictor.horizon,
-        "solved_by": predictor.solved_by,
+        "solved_by": found.solved_by,
     }
 
 

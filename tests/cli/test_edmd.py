@@ -177,12 +177,12 @@ def test_several_trajectories_are_fitted_together(koop):
     fit = json.loads(koop("fit-edmd", one, other, "--json").out)
     both = koopcli.load(fit["name"])
     alone = [koopcli.load(koop("fit-edmd", name).name) for name in (one, other)]
-    assert not any(np.array_equal(both.A, single.A) for single in alone)
+    assert not any(np.array_equal(both.dynamics.A, single.dynamics.A) for single in alone)
     low, high = (f([single.coverage.domain for single in alone]) for f in (lambda d: d[0][0], lambda d: d[1][1]))
     assert (both.coverage.domain[0] <= low).all()
     assert (both.coverage.domain[1] >= high).all()
     again = koop("fit-edmd", one, other, "--set", "fit-edmd.chunk=37")
-    assert pytest.approx(both.A, rel=1e-8, abs=1e-9) == koopcli.load(again.name).A
+    assert pytest.approx(both.dynamics.A, rel=1e-8, abs=1e-9) == koopcli.load(again.name).dynamics.A
     scored = json.loads(koop("evaluate", fit["name"], "--json").out)
     assert {"hold", "linear"} <= scored["baselines"].keys()
     assert koop("show", "--lineage", fit["name"]).out.count("simulate/") == 2

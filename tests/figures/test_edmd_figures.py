@@ -14,7 +14,7 @@ from koopcli.figures.drawing import Source
 from koopcli.figures.orders import OrderErrors
 from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
-from koopcli.koopman.predictor.modes import Modes
+from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
 from koopcli.koopman.scores.restarts import restarted
 from koopcli.records import Trajectories
 from tests.stages.toys import _looked_up, _predictor, _trajectories, figure_records, figure_settings
@@ -37,6 +37,12 @@ class Scored:
 
 def lines(figure):
     return {line.get_label(): line for line in figure.axes[0].lines}
+
+
+def _with(A):
+    """The toy predictor with another A."""
+    predictor = _predictor()
+    return replace(predictor, dynamics=replace(predictor.dynamics, A=A))
 
 
 def test_one_curve_shows_mean_median_and_maximum_and_the_paper():
@@ -109,7 +115,9 @@ def test_a_prediction_that_explodes_is_refused():
 def test_eigenvalues_of_a_matrix_and_their_rates():
     shown = spectrum.select([Source("", None, {"predictor": _predictor()})], figure_settings("spectrum"))
     assert shown.copies == 1
-    assert np.sort_complex(shown.eigenvalues) == pytest.approx(np.sort_complex(np.linalg.eigvals(_predictor().A)))
+    assert np.sort_complex(shown.eigenvalues) == pytest.approx(
+        np.sort_complex(np.linalg.eigvals(_predictor().dynamics.A))
+    )
     assert np.exp(shown.rates * 0.01) == pytest.approx(shown.eigenvalues)
     plane, density = spectrum.draw(shown).axes
     (rings,) = [line for line in plane.lines if line.get_marker() == "o"]
@@ -124,7 +132,7 @@ def test_eigenvalues_of_a_matrix_and_their_rates():
 def test_rings_that_lie_on_one_another_are_counted():
     """The bars hold every eigenvalue, each as often as it is there, in bins that are even on the axis of damping."""
     rates = np.concatenate([np.full(500, -0.03), [-20.0, 0.0, 0.5]])
-    predictor = replace(_predictor(), A=np.diag(np.exp(0.01 * rates)))
+    predictor = _with(np.diag(np.exp(0.01 * rates)))
     shown = spectrum.select([Source("", None, {"predictor": predictor})], figure_settings("spectrum"))
     numbers = {name: array.values for name, array in spectrum.numbers(shown).items()}
     assert numbers["bin/count"].sum() == 503
@@ -135,20 +143,22 @@ def test_rings_that_lie_on_one_another_are_counted():
     assert bars.get_data().values.tolist() == numbers["bin/count"].tolist()
     many = _looked_up()
     twice = spectrum.select([Source("", None, {"predictor": many})], figure_settings("spectrum"))
-    assert twice.counts.sum() == 2 * len(many.A.rates)
+    assert twice.counts.sum() == 2 * len(many.dynamics.modes.rates)
 
 
 def test_eigenvalues_of_modes_are_those_of_one_block():
     predictor = _looked_up()
-    assert isinstance(predictor.A, Modes)
+    assert isinstance(predictor.dynamics, Diagonal)
     shown = spectrum.select([Source("", None, {"predictor": predictor})], figure_settings("spectrum"))
     assert (shown.copies, len(shown.rates)) == (2, 3)
-    assert np.sort_complex(shown.eigenvalues) == pytest.approx(np.sort_complex(np.linalg.eigvals(predictor.A.block)))
+    assert np.sort_complex(shown.eigenvalues) == pytest.approx(
+        np.sort_complex(np.linalg.eigvals(predictor.dynamics.modes.block))
+    )
     assert set(spectrum.numbers(shown)["copies"].values) == {2.0}
 
 
 def test_growing_eigenvalues_are_told_apart_and_a_zero_has_no_rate():
-    predictor = replace(_predictor(), A=np.diag([1.5, 0.5, 0.0, 0.5, 0.5, 0.5, 0.5, 1.0]))
+    predictor = _with(np.diag([1.5, 0.5, 0.0, 0.5, 0.5, 0.5, 0.5, 1.0]))
     shown = spectrum.select([Source("", None, {"predictor": predictor})], figure_settings("spectrum"))
     assert np.sort(shown.rates.real)[0] == -np.inf
     plane, _density = spectrum.draw(shown).axes

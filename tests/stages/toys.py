@@ -25,8 +25,12 @@ from koopcli.koopman.bases.polynomial import Polynomial
 from koopcli.koopman.eigen.nodes import Search, nodes_of
 from koopcli.koopman.eigen.tabulated import Tabulated
 from koopcli.koopman.predictor.coverage import Coverage
+from koopcli.koopman.predictor.dynamics.bilinear import Bilinear
+from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
+from koopcli.koopman.predictor.dynamics.linear import Linear
 from koopcli.koopman.predictor.modes import Modes
 from koopcli.koopman.predictor.predictor import Predictor
+from koopcli.koopman.predictor.regression import Regression
 from koopcli.koopman.predictor.trust import Trust
 from koopcli.koopman.scores.baselines import Forecast
 from koopcli.koopman.scores.evaluation import Evaluation
@@ -85,7 +89,8 @@ def _predictor(growth: float = 0.95) -> Predictor:
     basis = Polynomial((axis, axis, axis), np.array(list(np.ndindex(2, 2, 2))))
     A = growth * np.eye(8) + 0.01 * np.cos(np.arange(64.0)).reshape(8, 8)
     B = 1e-4 * np.sin(np.arange(32.0)).reshape(8, 4)
-    return Predictor(basis, A, B, basis.state_map, 0.01, _coverage(), STATES, INPUTS, 12, 12, 1.0)
+    found = Regression(12, 12, 1.0)
+    return Predictor(basis, Linear(A, B), basis.state_map, 0.01, _coverage(), STATES, INPUTS, found)
 
 
 def _coverage() -> Coverage:
@@ -121,9 +126,10 @@ def _looked_up() -> Predictor:
     C = 10 * np.cos(np.arange(18.0)).reshape(3, 6)
     states = 3 * np.sin(np.arange(45.0) ** 2).reshape(3, 5, 3)
     lift = Tabulated(states, nodes_of(states, states.shape[1], Search("nearest", np.ones(3))), starts, modes)
-    found = Predictor(lift, modes, np.zeros((6, 4)), C, 0.01, _coverage(), STATES, INPUTS, 5, 6, 1e3, horizon=8)
+    regression = Regression(5, 6, 1e3, missed=0.7)
+    found = Predictor(lift, Diagonal(modes, 4), C, 0.01, _coverage(), STATES, INPUTS, regression, horizon=8)
     trust = Trust(states.reshape(15, 3), 1 + np.arange(15.0), np.ones(3), 0.5, 1.5)
-    return replace(found, missed=0.7, trust=trust)
+    return replace(found, trust=trust)
 
 
 def _calm() -> Trajectories:
@@ -143,7 +149,8 @@ def _forecast(kind: str) -> Forecast:
 
 
 def _bilinear() -> Predictor:
-    return replace(_predictor(), N=1e-3 * np.cos(np.arange(256.0) ** 2).reshape(4, 8, 8))
+    linear, N = _predictor().dynamics, 1e-3 * np.cos(np.arange(256.0) ** 2).reshape(4, 8, 8)
+    return replace(_predictor(), dynamics=Bilinear(linear.A, linear.B, N))
 
 
 def _evaluation() -> Evaluation:

@@ -12,12 +12,18 @@ from koopcli.koopman.bases import BASES, Basis, Choice
 from koopcli.koopman.edmd.blockwise import fit_blocks
 from koopcli.koopman.edmd.generator import generator_of
 from koopcli.koopman.edmd.inputs import white_inputs
+from koopcli.koopman.edmd.operators import Operators
 from koopcli.koopman.edmd.passes import Over, here
 from koopcli.koopman.edmd.product import fit_product
 from koopcli.koopman.edmd.survey import Survey, survey
 from koopcli.koopman.edmd.transitions import Transitions
 from koopcli.koopman.predictor.coverage import Coverage, coverage_of
+from koopcli.koopman.predictor.dynamics import Dynamics
+from koopcli.koopman.predictor.dynamics.bilinear import Bilinear
+from koopcli.koopman.predictor.dynamics.generator import Generator
+from koopcli.koopman.predictor.dynamics.linear import Linear
 from koopcli.koopman.predictor.predictor import Predictor
+from koopcli.koopman.predictor.regression import Regression
 from koopcli.progress import Progress, silent
 from koopcli.records import Trajectories
 
@@ -84,28 +90,27 @@ def fit(
         found = fit_product(product, seen, basis, method.bilinear, method.ridge, progress)
     else:
         found = fit_blocks(seen, basis, method.bilinear, method.ridge, method.cholesky, over)
-    generator = None
-    if method.generator:
-        assert found.N is not None
-        assert basis.constant is not None, "a basis without a constant is refused by whoever chooses it"
-        generator = generator_of(found.A, found.B, found.N, basis.constant, pairs.dt)
     return Predictor(
         observables=basis,
-        A=found.A,
-        B=found.B,
+        dynamics=_dynamics(found, method, basis.constant, pairs.dt),
         C=basis.state_map,
-        N=found.N,
-        generator=generator,
         dt=pairs.dt,
         coverage=coverage_of(seen.states, seen.corners),
         state_channels=pairs.state_channels,
         input_channels=pairs.input_channels,
-        rank=found.rank,
-        directions=found.directions,
-        condition=found.condition,
-        solved_by=found.solved_by,
+        regression=Regression(found.rank, found.directions, found.condition, found.solved_by),
         plant=pairs.plant,
     )
+
+
+def _dynamics(found: Operators, method: Method, constant: int | None, dt: float) -> Dynamics:
+    """Linear, bilinear or by a generator."""
+    if found.N is None:
+        return Linear(found.A, found.B)
+    if not method.generator:
+        return Bilinear(found.A, found.B, found.N)
+    assert constant is not None, "a basis without a constant is refused by whoever chooses it"
+    return Generator(generator_of(found.A, found.B, found.N, constant, dt), dt)
 
 
 def check_samples(samples: int, functions: int, inputs: int, *, bilinear: bool) -> None:

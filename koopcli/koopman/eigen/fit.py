@@ -17,8 +17,10 @@ from koopcli.koopman.eigen.nodes import Search, nodes_of
 from koopcli.koopman.eigen.rates import RATES, Spectrum, Windows, check_growth
 from koopcli.koopman.eigen.tabulated import Tabulated
 from koopcli.koopman.predictor.coverage import coverage_of
+from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
 from koopcli.koopman.predictor.modes import Modes, newton_couplings
 from koopcli.koopman.predictor.predictor import Predictor
+from koopcli.koopman.predictor.regression import Regression
 from koopcli.progress import Progress, silent
 from koopcli.records import FloatArray, Trajectories
 
@@ -87,8 +89,8 @@ def _along(trajectories: Trajectories, x: FloatArray, reading: Reading, modes: M
     table = x[:, : reading.tabulated + 1]
     nodes = nodes_of(table, table.shape[1], _search(reading, x))
     lift = Tabulated(table, nodes, solution.starts, repeated)
-    rank, directions = solution.rank, solution.directions
-    return _predictor(trajectories, reading, lift, solution.C, rank, directions, solution.condition, solution.missed)
+    found = Regression(solution.rank, solution.directions, solution.condition, missed=solution.missed)
+    return _predictor(trajectories, reading, lift, solution.C, found)
 
 
 def _ahead(
@@ -111,9 +113,9 @@ def _ahead(
         ahead = lift.future(x[:, -1])[:, 1 : reading.tabulated - known + 1]
         lift = futures(np.concatenate([x, ahead], axis=1), reading.tabulated + 1)
     C = boundary.read_off(n_x, len(modes.rates))
-    rank = int(time.kept(cut).sum())
-    condition, missed = boundary.condition_of(time.singular), boundary.missed_ahead(x, time, cut)
-    found = _predictor(trajectories, reading, lift, C, rank, len(modes.rates), condition, missed)
+    rank, condition = int(time.kept(cut).sum()), boundary.condition_of(time.singular)
+    regression = Regression(rank, len(modes.rates), condition, missed=boundary.missed_ahead(x, time, cut))
+    found = _predictor(trajectories, reading, lift, C, regression)
     if not reading.trust:
         return found
     groups = np.tile(np.arange(len(x) // images), images)
@@ -125,32 +127,20 @@ def _ahead(
 
 
 def _predictor(
-    trajectories: Trajectories,
-    reading: Reading,
-    lift: Tabulated | Futures,
-    C: FloatArray,
-    rank: int,
-    directions: int,
-    condition: float,
-    missed: float,
+    trajectories: Trajectories, reading: Reading, lift: Tabulated | Futures, C: FloatArray, regression: Regression
 ) -> Predictor:
     """What both kinds of lift have in common."""
-    states, modes = lift.nodes.states, lift.modes
     return Predictor(
         observables=lift,
-        A=modes,
-        B=np.zeros((len(modes), len(trajectories.input_channels))),
+        dynamics=Diagonal(lift.modes, len(trajectories.input_channels)),
         C=C,
         dt=trajectories.dt,
-        coverage=coverage_of(states),
+        coverage=coverage_of(lift.nodes.states),
         state_channels=trajectories.state_channels,
         input_channels=trajectories.input_channels,
-        rank=rank,
-        directions=directions,
-        condition=condition,
+        regression=regression,
         horizon=reading.horizon,
         plant=trajectories.plant,
-        missed=missed,
         beyond=LOOKUPS[reading.lift].beyond,
     )
 

@@ -6,36 +6,32 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from koopcli.content import Content
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.predictor import responses
 from koopcli.koopman.predictor.coverage import Coverage
-from koopcli.koopman.predictor.lifts import Lift, Observed
-from koopcli.koopman.predictor.modes import Modes
+from koopcli.koopman.predictor.dynamics import DYNAMICS, Dynamics
+from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
+from koopcli.koopman.predictor.lifts import Lift
+from koopcli.koopman.predictor.regression import Regression
 from koopcli.koopman.predictor.trust import Trust
 from koopcli.progress import Progress, silent
 from koopcli.records import Array, Channels, FloatArray, Meta, Packed
 
-UnpackLift = Callable[[Packed, Any], Lift]  # of what is stored of a lift, and the A that goes with it
+UnpackLift = Callable[[Packed, Dynamics], Lift]  # of what is stored of a lift, and the dynamics that go with it
 EXTRAPOLATES = "continue the functions fitted inside"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Predictor(Content):
-    """z⁺ = A z + B u, x̂ = C z with z = ψ(x): eqs. (4.1), (4.2) of docs/equations.md. A bilinear one adds Σ_i u_i N_i z
-    (4.6), or steps by its ``generator`` (4.9), of which A, B and N are then the value and the slope at u = 0.
-    """
+    """x̂ = C z with z = ψ(x) and its dynamics, such as z⁺ = A z + B u: eqs. (4.1), (4.2) of docs/equations.md."""
 
     observables: Lift
     """The lift ψ."""
-    A: FloatArray | Modes
-    """(N, N), as a matrix or by its rates."""
-    B: FloatArray
-    """(N, n_u)."""
+    dynamics: Dynamics
+    """How the lifted state moves on."""
     C: FloatArray
     """(n_x, N)."""
     dt: float
@@ -46,61 +42,41 @@ class Predictor(Content):
     """Names and units of x."""
     input_channels: Channels
     """Names and units of u."""
-    rank: int
-    """How many directions the data determine."""
-    directions: int
-    """How many directions the regression has."""
-    condition: float
-    """Condition number of the regression."""
+    regression: Regression
+    """What the regression behind it found."""
     horizon: int | None = None
     """The most steps that it may be asked for, None for any number."""
     plant: Meta = field(default_factory=dict)
     """What was identified, as JSON."""
-    N: FloatArray | None = None
-    """The N_i (n_u, N, N) of a bilinear one."""
-    generator: FloatArray | None = None
-    """(1 + n_u, N, N) in 1/s, of one in continuous time."""
-    missed: float | None = None
-    """The share of the data in percent that its exponentials do not represent."""
     beyond: str = EXTRAPOLATES
     """What it does outside the hull of its data."""
     trust: Trust | None = None
     """An estimate of its errors."""
-    solved_by: str = ""
-    """How the regression was solved, as :mod:`koopcli.koopman.edmd.blockwise` and ``product`` name it."""
 
     def __repr__(self) -> str:
         """Its spectral radius is told where it is known already, or costs nothing."""
-        known = isinstance(self.A, Modes) or "spectral_radius" in vars(self)
+        known = "spectral_radius" in vars(self.dynamics) or isinstance(self.dynamics, Diagonal)
         radius = f", spectral radius {self.spectral_radius:.6f}" if known else ""
         ahead = "" if self.horizon is None else f", {self.horizon} at most"
         return (
-            f"Predictor: {self.dynamics}, {self.functions} functions ({type(self.observables).__name__}), "
+            f"Predictor: {self.dynamics.about}, {self.functions} functions ({type(self.observables).__name__}), "
             f"steps of {self.dt:g} s{ahead}{radius}\n  states {self.state_channels}\n  inputs {self.input_channels}"
         )
 
     @property
-    def dynamics(self) -> str:
-        """How its lifted state moves on, in a word or two."""
-        if self.N is None:
-            return "linear by rates" if isinstance(self.A, Modes) else "linear"
-        return "bilinear" if self.generator is None else "bilinear by a generator"
-
-    @property
     def functions(self) -> int:
         """Dimension N of the lifted state."""
-        return len(self.A)
+        return len(self.dynamics)
 
-    @cached_property
+    @property
     def spectral_radius(self) -> float:
-        """The largest absolute value of A's eigenvalues: of what it predicts without input, above one grows."""
-        eigenvalues = self.A.eigenvalues if isinstance(self.A, Modes) else np.linalg.eigvals(self.A)
-        return float(np.abs(eigenvalues).max())
+        """The largest absolute value of the eigenvalues of what it predicts without input: above one it grows."""
+        return self.dynamics.spectral_radius
 
     @property
     def knows_inputs(self) -> bool:
         """Whether inputs move the prediction at all."""
-        return bool(self.B.any() or (self.N is not None and self.N.any()))
+        return bool(self.dynamics.acting.any())
 
     def lift(self, x: FloatArray) -> FloatArray:
         """The lifted state z (..., N) of ``x`` (..., n_x)."""
@@ -136,10 +112,7 @@ class Predictor(Content):
         n = math.prod(shape)
         check_horizon(k, self.horizon)
         x0, u = x0.reshape(n, n_x), u.reshape(n, k, n_u)
-        if self._advance is None:
-            x = responses.linear(self.observables, self.A, self.B, self.C, x0, u)
-        else:
-            x = responses.rolled(self.observables, self._advance, self.C, x0, u, progress)
+        x = self.dynamics.predict(self.observables, self.C, x0, u, progress)
         return x.reshape(*shape, k + 1, n_x)
 
     def bound(self, x: FloatArray) -> FloatArray | None:
@@ -150,34 +123,20 @@ class Predictor(Content):
 
     def step(self, x: FloatArray, u: FloatArray) -> FloatArray:
         """One step from the states ``x`` (n, n_x) lifted afresh, under ``u`` (n, n_u)."""
-        if self._advance is None:
-            return self._onward(x) + u @ (self.C @ self.B).T
-        return np.asarray(self._advance(self.observables.lift(x), u) @ self.C.T)
+        return self._step(x, u)
 
     @cached_property
-    def _onward(self) -> Observed:
-        """C A ψ(x)."""
-        return self.observables.onto(self.C @ self.A)
-
-    @cached_property
-    def _advance(self) -> responses.Advance | None:
-        """How the lifted state of a bilinear predictor moves, which has no powers of one matrix."""
-        if self.N is None:
-            return None
-        if self.generator is not None:
-            return responses.generator_step(self.generator, self.dt)
-        assert not isinstance(self.A, Modes)
-        return responses.bilinear_step(self.A, self.B, self.N)
+    def _step(self) -> Callable[[FloatArray, FloatArray], FloatArray]:
+        return self.dynamics.stepper(self.observables, self.C)
 
     def pack(self) -> Packed:
         """The predictor for storage."""
         observables, state = self.observables.pack(), self.state_channels.unit_text
         coverage = self.coverage.pack(state)
+        dynamics = self.dynamics.pack(self.input_channels)
         arrays = {
-            **_pack_operator(self.A),
-            "B": Array(self.B, ("lifted", "input"), ", ".join(f"1/({unit})" for unit in self.input_channels.units)),
+            **dynamics.arrays,
             "C": Array(self.C, ("state", "lifted"), state),
-            **_pack_bilinear(self.N, self.generator, self.input_channels),
             **{f"coverage/{name}": array for name, array in coverage.arrays.items()},
             **{f"lift/{name}": array for name, array in observables.arrays.items()},
         }
@@ -186,15 +145,10 @@ class Predictor(Content):
             arrays |= {f"trust/{name}": array for name, array in trust.arrays.items()}
         meta = {
             "dt": self.dt,
-            "copies": self.A.copies if isinstance(self.A, Modes) else None,
-            "rank": self.rank,
-            "directions": self.directions,
-            "condition": self.condition if np.isfinite(self.condition) else None,
-            "spectral_radius": self.spectral_radius,
-            **({"solved_by": self.solved_by} if self.solved_by else {}),
+            "dynamics": {**dynamics.meta, "spectral_radius": self.spectral_radius},
+            "regression": self.regression.pack(),
             "horizon": self.horizon,
             "plant": self.plant,
-            "missed": self.missed,
             "beyond": self.beyond,
             "trust": None if trust is None else trust.meta,
             "lift": observables.meta,
@@ -207,36 +161,22 @@ class Predictor(Content):
     def unpack(cls, packed: Packed, lifts: Mapping[str, UnpackLift]) -> Predictor:
         """The inverse of :meth:`pack`; ``lifts`` reads a lift of each kind (:mod:`koopcli.koopman.stored`)."""
         meta, arrays = packed.meta, packed.arrays
-        A: FloatArray | Modes
-        if meta["copies"] is None:
-            A = arrays["A"].values[...]
-        else:
-            rates = arrays["rates"].values[...]
-            couplings = arrays["couplings"].values[...]
-            A = Modes(rates[:, 0] + 1j * rates[:, 1], couplings, meta["copies"], meta["dt"])
-        found = cls(
-            observables=lifts[meta["lift"]["kind"]](Packed(packed.below("lift/"), meta["lift"]), A),
-            A=A,
-            B=arrays["B"].values[...],
+        dynamics = DYNAMICS[meta["dynamics"]["kind"]](Packed(arrays, meta["dynamics"]))
+        vars(dynamics)["spectral_radius"] = meta["dynamics"]["spectral_radius"]  # it costs as much as a small fit
+        return cls(
+            observables=lifts[meta["lift"]["kind"]](Packed(packed.below("lift/"), meta["lift"]), dynamics),
+            dynamics=dynamics,
             C=arrays["C"].values[...],
-            N=arrays["N"].values[...] if "N" in arrays else None,
-            generator=arrays["generator"].values[...] if "generator" in arrays else None,
             dt=meta["dt"],
             coverage=Coverage.unpack(Packed(packed.below("coverage/"))),
             state_channels=Channels.unpack(meta["state_channels"]),
             input_channels=Channels.unpack(meta["input_channels"]),
-            rank=meta["rank"],
-            directions=meta["directions"],
-            condition=np.inf if meta["condition"] is None else meta["condition"],
-            solved_by=meta.get("solved_by", ""),
+            regression=Regression.unpack(meta["regression"]),
             horizon=meta["horizon"],
             plant=meta["plant"],
-            missed=meta["missed"],
             beyond=meta["beyond"],
             trust=None if meta["trust"] is None else Trust.unpack(Packed(packed.below("trust/"), meta["trust"])),
         )
-        vars(found)["spectral_radius"] = meta["spectral_radius"]  # it costs as much as a small fit
-        return found
 
 
 def check_horizon(steps: int, horizon: int | None) -> None:
@@ -246,24 +186,3 @@ def check_horizon(steps: int, horizon: int | None) -> None:
             f"{steps} steps are past the window that was fitted: this predictor may be asked for {horizon} at most; "
             "ask for fewer, or fit longer trajectories (simulate.steps) or a shorter table (fit-eigen.tabulate)"
         )
-
-
-def _pack_operator(A: FloatArray | Modes) -> dict[str, Array]:
-    """A as a matrix, or the continuous rates and couplings of its repeated block beside the discrete block itself."""
-    if not isinstance(A, Modes):
-        return {"A": Array(A, ("lifted", "lifted"), "1")}
-    return {
-        "rates": Array(np.column_stack([A.rates.real, A.rates.imag]), ("mode", "real and imaginary"), "1/s"),
-        "couplings": Array(A.couplings, ("mode",), "1/s"),
-        "A/block": Array(A.block, ("state of a block", "state of a block"), "1"),
-    }
-
-
-def _pack_bilinear(N: FloatArray | None, generator: FloatArray | None, inputs: Channels) -> dict[str, Array]:
-    found = {}
-    if N is not None:
-        found["N"] = Array(N, ("input", "lifted", "lifted"), ", ".join(f"1/({unit})" for unit in inputs.units))
-    if generator is not None:
-        each = ["1/s", *(f"1/(s {unit})" for unit in inputs.units)]
-        found["generator"] = Array(generator, ("none and each input", "lifted", "lifted"), ", ".join(each))
-    return found

@@ -87,11 +87,11 @@ def test_a_linear_system_is_recovered_exactly(product):
     data = synthetic(lambda x, u: x @ A.T + u @ B.T, x0, u, (40, 7) if product else None)
     basis = Monomials(((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)))
     predictor = edmd.fit(data, basis)
-    assert predictor.A[1:, 1:] == pytest.approx(A, abs=1e-12)
-    assert predictor.A[1:, 0] == pytest.approx(np.zeros(3), abs=1e-12)
-    assert predictor.B[1:] == pytest.approx(B, abs=1e-12)
-    assert predictor.B[0] == pytest.approx([0, 0], abs=1e-12)
-    assert predictor.rank == 6
+    assert predictor.dynamics.A[1:, 1:] == pytest.approx(A, abs=1e-12)
+    assert predictor.dynamics.A[1:, 0] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert predictor.dynamics.B[1:] == pytest.approx(B, abs=1e-12)
+    assert predictor.dynamics.B[0] == pytest.approx([0, 0], abs=1e-12)
+    assert predictor.regression.rank == 6
 
 
 def test_the_slow_manifold_gives_its_three_eigenvalues():
@@ -103,9 +103,9 @@ def test_the_slow_manifold_gives_its_three_eigenvalues():
 
     data = synthetic(step, rng.uniform(-1, 1, (50, 2)), np.zeros((50, 6, 1)))
     predictor = edmd.fit(data, Monomials(((1, 0), (0, 1), (2, 0))))
-    assert np.sort(np.linalg.eigvals(predictor.A)) == pytest.approx(np.sort([a, b, a**2]), abs=1e-12)
-    assert predictor.rank == 3  # the input never moved: its direction is dropped and not invented
-    assert not predictor.B.any()
+    assert np.sort(np.linalg.eigvals(predictor.dynamics.A)) == pytest.approx(np.sort([a, b, a**2]), abs=1e-12)
+    assert predictor.regression.rank == 3  # the input never moved: its direction is dropped and not invented
+    assert not predictor.dynamics.B.any()
     x_hat = predictor.predict(np.array([0.8, -0.3]), steps=20)
     truth = synthetic(step, np.array([[0.8, -0.3]]), np.zeros((1, 20, 1))).x[0]
     assert x_hat == pytest.approx(truth, abs=1e-12)
@@ -133,11 +133,11 @@ def test_blocks_and_product_agree(reduced, order):
     other = edmd.basis_from_data(general, Choice("tensor", order))
     blocks = edmd.fit(general, other)
     for name in "AB":
-        one, two = getattr(product, name), getattr(blocks, name)
+        one, two = getattr(product.dynamics, name), getattr(blocks.dynamics, name)
         assert np.abs(one - two).max() <= 1e-9 * np.abs(one).max()
     assert (blocks.C == product.C).all()
-    assert blocks.rank == product.rank == basis.functions + 4
-    assert blocks.condition == pytest.approx(product.condition, rel=0.1)
+    assert blocks.regression.rank == product.regression.rank == basis.functions + 4
+    assert blocks.regression.condition == pytest.approx(product.regression.condition, rel=0.1)
     assert (blocks.coverage.domain == product.coverage.domain).all()
 
 
@@ -147,8 +147,8 @@ def test_the_size_of_a_block_does_not_matter(reduced, monkeypatch):
     large = edmd.fit(general, basis)
     monkeypatch.setattr(sums, "READ", 100)
     small = edmd.fit(general, basis)
-    assert pytest.approx(large.A, rel=1e-10, abs=1e-12) == small.A
-    assert pytest.approx(large.A, rel=1e-9, abs=1e-12) == edmd.fit(reduced, basis).A
+    assert pytest.approx(large.dynamics.A, rel=1e-10, abs=1e-12) == small.dynamics.A
+    assert pytest.approx(large.dynamics.A, rel=1e-9, abs=1e-12) == edmd.fit(reduced, basis).dynamics.A
 
 
 def test_a_raw_monomial_fit_predicts_the_same(plant, reduced):
@@ -193,13 +193,17 @@ def test_inputs_that_determine_too_little_give_one_answer_by_either_path(columns
     data = synthetic(lambda x, u: x @ A.T + u @ B.T, x0, u, (40, 3))
     basis = Monomials(((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)))
     product, blocks = edmd.fit(data, basis), edmd.fit(replace(data, product=None), basis)
-    assert product.rank == blocks.rank == 4 + np.linalg.matrix_rank(columns - columns.mean(axis=0), tol=1e-9)
-    assert pytest.approx(blocks.A, abs=1e-9) == product.A
-    assert pytest.approx(blocks.B, abs=1e-9) == product.B
+    assert (
+        product.regression.rank
+        == blocks.regression.rank
+        == 4 + np.linalg.matrix_rank(columns - columns.mean(axis=0), tol=1e-9)
+    )
+    assert pytest.approx(blocks.dynamics.A, abs=1e-9) == product.dynamics.A
+    assert pytest.approx(blocks.dynamics.B, abs=1e-9) == product.dynamics.B
     assert product.predict(x0[:5], u[:5]) == pytest.approx(data.x[:5], abs=1e-9)
     moving = np.ptp(columns, axis=0) > 0  # what never moves is no direction; what moves with another is one too many
-    assert product.directions == blocks.directions == 4 + moving.sum()
-    assert (product.condition > 1e10) == (product.rank < product.directions)
+    assert product.regression.directions == blocks.regression.directions == 4 + moving.sum()
+    assert (product.regression.condition > 1e10) == (product.regression.rank < product.regression.directions)
 
 
 def bilinear_data(product, mean=0.3):
@@ -220,13 +224,13 @@ def test_a_bilinear_system_is_recovered_exactly(product, constant):
     basis = Monomials(((0, 0, 0), *exponents) if constant else exponents)
     predictor = edmd.fit(data, basis, edmd.Method(bilinear=True))
     at = slice(1, None) if constant else slice(None)
-    assert predictor.A[at, at] == pytest.approx(A, abs=1e-10)
-    assert predictor.B[at] == pytest.approx(B, abs=1e-10)
-    assert predictor.N[:, at, at] == pytest.approx(N, abs=1e-10)
+    assert predictor.dynamics.A[at, at] == pytest.approx(A, abs=1e-10)
+    assert predictor.dynamics.B[at] == pytest.approx(B, abs=1e-10)
+    assert predictor.dynamics.N[:, at, at] == pytest.approx(N, abs=1e-10)
     if constant:  # one keeps one, and its products with the inputs are B's
-        assert predictor.A[0] == pytest.approx(np.eye(4)[0], abs=1e-10)
-        assert (predictor.N[:, :, 0] == 0).all()
-    assert predictor.rank == predictor.directions == (12 if constant else 11)
+        assert predictor.dynamics.A[0] == pytest.approx(np.eye(4)[0], abs=1e-10)
+        assert (predictor.dynamics.N[:, :, 0] == 0).all()
+    assert predictor.regression.rank == predictor.regression.directions == (12 if constant else 11)
     assert predictor.predict(data.x[:, 0], data.u) == pytest.approx(data.x, abs=1e-10)
 
 
@@ -239,13 +243,13 @@ def test_blocks_and_product_agree_for_every_method(reduced, choice, bilinear, ri
     method = edmd.Method(bilinear, ridge)
     basis = edmd.basis_from_data(reduced, choice)
     fast, plain = (edmd.fit(data, basis, method) for data in (reduced, replace(reduced, product=None)))
-    size = np.abs(plain.A).max()
-    assert pytest.approx(plain.A, abs=1e-9 * size) == fast.A
-    assert pytest.approx(plain.B, abs=1e-9 * np.abs(plain.B).max()) == fast.B
-    assert (fast.N is None) == (not bilinear)
+    size = np.abs(plain.dynamics.A).max()
+    assert pytest.approx(plain.dynamics.A, abs=1e-9 * size) == fast.dynamics.A
+    assert pytest.approx(plain.dynamics.B, abs=1e-9 * np.abs(plain.dynamics.B).max()) == fast.dynamics.B
+    assert fast.dynamics.about == ("bilinear" if bilinear else "linear")
     if bilinear:
-        assert pytest.approx(plain.N, abs=1e-9 * np.abs(plain.N).max()) == fast.N
-    assert (fast.rank, fast.directions) == (plain.rank, plain.directions)
+        assert pytest.approx(plain.dynamics.N, abs=1e-9 * np.abs(plain.dynamics.N).max()) == fast.dynamics.N
+    assert (fast.regression.rank, fast.regression.directions) == (plain.regression.rank, plain.regression.directions)
     x, u = plain.coverage.states[:20], np.full((20, 5, 4), 1e3)
     assert fast.predict(x, u) == pytest.approx(plain.predict(x, u), rel=1e-7)
 
@@ -258,7 +262,8 @@ def test_a_bilinear_prediction_is_the_rolled_system(reduced, monkeypatch):
     for k in range(6):
         z = np.stack(
             [
-                (predictor.A + np.tensordot(u[i, k], predictor.N, axes=1)) @ z[i] + predictor.B @ u[i, k]
+                (predictor.dynamics.A + np.tensordot(u[i, k], predictor.dynamics.N, axes=1)) @ z[i]
+                + predictor.dynamics.B @ u[i, k]
                 for i in range(9)
             ]
         )
@@ -291,9 +296,9 @@ def test_the_generator_of_a_bilinear_flow_is_recovered():
     data = replace(data, dt=dt)
     basis = Monomials(((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)))
     slope, exact = (edmd.fit(data, basis, edmd.Method(bilinear=True, generator=g)) for g in (False, True))
-    assert exact.generator[0, 1:, 1:] == pytest.approx(K, abs=1e-6)
-    assert exact.generator[1:, 1:, 1:] == pytest.approx(Ks, abs=1e-5)
-    assert pytest.approx(L, abs=1e-5) == exact.generator[1:, 1:, 0].T
+    assert exact.dynamics.K[0, 1:, 1:] == pytest.approx(K, abs=1e-6)
+    assert exact.dynamics.K[1:, 1:, 1:] == pytest.approx(Ks, abs=1e-5)
+    assert pytest.approx(L, abs=1e-5) == exact.dynamics.K[1:, 1:, 0].T
     far = synthetic(step, states[:5], 2 * rng.standard_normal((5, 8, 2)))
     errors = [np.abs(p.predict(far.x[:, 0], far.u) - far.x).max() for p in (slope, exact)]
     assert errors[0] > 1e-2
@@ -320,8 +325,8 @@ def test_without_products_in_the_truth_there_are_none_in_the_fit():
     straight = synthetic(lambda x, u: x @ A.T + u @ B.T, data.x[:, 0], data.u, data.product)
     basis = Monomials(((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)))
     linear, bilinear = (edmd.fit(straight, basis, edmd.Method(terms)) for terms in (False, True))
-    assert np.abs(bilinear.N).max() < 1e-12
-    assert pytest.approx(linear.A, abs=1e-12) == bilinear.A
+    assert np.abs(bilinear.dynamics.N).max() < 1e-12
+    assert pytest.approx(linear.dynamics.A, abs=1e-12) == bilinear.dynamics.A
 
 
 def test_a_ridge_is_the_least_squares_of_rows_added(reduced):
@@ -337,13 +342,15 @@ def test_a_ridge_is_the_least_squares_of_rows_added(reduced):
         np.linalg.lstsq(np.vstack([V / scale, rows]), np.vstack([basis.lift(x_next), np.zeros((9, 10))]), rcond=None)[0]
         / scale[:, None]
     )
-    assert pytest.approx(W[1:10].T, abs=1e-9) == predictor.A[:, 1:]
-    assert pytest.approx(W[10:].T, abs=1e-12) == predictor.B
+    assert pytest.approx(W[1:10].T, abs=1e-9) == predictor.dynamics.A[:, 1:]
+    assert pytest.approx(W[10:].T, abs=1e-12) == predictor.dynamics.B
 
 
 def test_a_larger_ridge_shrinks(reduced):
     basis = edmd.basis_from_data(reduced, Choice("tensor", 2))
-    sizes = [np.linalg.norm(edmd.fit(reduced, basis, edmd.Method(ridge=r)).A[:, 1:]) for r in (0, 1e-3, 1e-1, 10)]
+    sizes = [
+        np.linalg.norm(edmd.fit(reduced, basis, edmd.Method(ridge=r)).dynamics.A[:, 1:]) for r in (0, 1e-3, 1e-1, 10)
+    ]
     assert sizes == sorted(sizes, reverse=True)
     assert sizes[-1] < 0.2 * sizes[0]
 
@@ -358,8 +365,8 @@ def test_the_textbooks_normal_equations_agree_while_they_last(plant):
     )
     expected = sound.predict(test.x[:, 0], test.u)
     assert np.abs(plain.predict(test.x[:, 0], test.u) - expected).max() < 1e-4 * np.abs(expected).max()
-    assert plain.condition > 1e12
-    assert sound.condition < 100
+    assert plain.regression.condition > 1e12
+    assert sound.regression.condition < 100
     with pytest.raises(InvalidValueError, match="not positive definite any more"):
         edmd.fit(data, edmd.basis_from_data(data, Choice("tensor", 9, raw=True)), edmd.Method(cholesky=True))
 
@@ -379,7 +386,7 @@ def test_what_leaves_a_fit_open_is_named(reduced):
         (together, "inputs move only together"),
     ):
         predictor = edmd.fit(data, basis)
-        assert predictor.rank < predictor.directions
+        assert predictor.regression.rank < predictor.regression.directions
         assert re.search(cause, edmd.why_deficient(data, predictor))
     with pytest.raises(InvalidValueError, match=r"v_y is 3 m/s throughout .* not 2"):
         edmd.basis_from_data(still, Choice("tensor", 2))
@@ -452,7 +459,7 @@ def test_the_reference_table_at_full_size(full, scored, draw):
     fitted, figures_of = scored
     assert len(full(draw, 0)) == 202_500
     for order in ORDERS:
-        assert fitted(draw, order, 0).condition < 3
+        assert fitted(draw, order, 0).regression.condition < 3
         for excitation in ("none", "fresh", "held"):
             figures = figures_of(excitation, draw, order, 0)
             for statistic, printed in zip(("mean", "median"), REFERENCE[draw][str(order)][excitation], strict=True):

@@ -73,11 +73,11 @@ def test_a_fit_in_parts_is_the_fit_of_the_whole(data, basis, method, size):
     whole = edmd.fit(data, basis, METHODS[method])
     parts = edmd.fit(data, basis, METHODS[method], over=in_parts(data, size))
     for name in ("A", "B", "N"):
-        one, two = getattr(whole, name), getattr(parts, name)
+        one, two = getattr(whole.dynamics, name, None), getattr(parts.dynamics, name, None)
         assert (one is None and two is None) or two == pytest.approx(one, rel=1e-9, abs=1e-10 * np.abs(one).max())
     assert (parts.coverage.domain == whole.coverage.domain).all()
     assert (parts.coverage.states == whole.coverage.states).all()
-    assert parts.condition == pytest.approx(whole.condition, rel=1e-6)
+    assert parts.regression.condition == pytest.approx(whole.regression.condition, rel=1e-6)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -88,11 +88,11 @@ def test_every_way_of_solving_gives_the_same(data, basis, method, monkeypatch):
         monkeypatch.setattr(regression, "GRAM_CONDITION", 0.0 if way == "QR" else 1e6)
         monkeypatch.setattr(blockwise, "GRAM_CONDITION", 0.0 if way == "QR" else 1e6)
         found[way] = edmd.fit(data, basis, METHODS[method], over=in_parts(data, 999))
-    assert [one.solved_by for one in found.values()] == ["moments", "normal equations", "QR"]
+    assert [one.regression.solved_by for one in found.values()] == ["moments", "normal equations", "QR"]
     for name in ("A", "B", "N"):
-        best = getattr(found["QR"], name)
+        best = getattr(found["QR"].dynamics, name, None)
         for way in ("moments", "entries"):
-            value = getattr(found[way], name)
+            value = getattr(found[way].dynamics, name, None)
             assert (value is None and best is None) or value == pytest.approx(
                 best, rel=1e-8, abs=1e-9 * np.abs(best).max()
             )
@@ -106,8 +106,8 @@ def test_lost_digits_of_moments_are_measured_and_the_entries_summed_instead(data
     off = replace(products, linear=tuple(c * (1 + 1e-7 * np.arange(c.size).reshape(c.shape)) for c in products.linear))
     monkeypatch.setitem(vars(basis), "products", off)
     found = edmd.fit(data, basis)
-    assert found.solved_by == "normal equations"
-    assert pytest.approx(right.A, rel=1e-9, abs=1e-12) == found.A
+    assert found.regression.solved_by == "normal equations"
+    assert pytest.approx(right.dynamics.A, rel=1e-9, abs=1e-12) == found.dynamics.A
 
 
 def test_a_harmful_condition_goes_to_qr_by_itself(plant):
@@ -118,9 +118,9 @@ def test_a_harmful_condition_goes_to_qr_by_itself(plant):
     x0[:, 1] = x0[:, 0] * (1 + 1e-5 * rng.standard_normal(len(x0)))
     data = trajectories_of(plant, replace(sample, states=x0), 1)
     found = edmd.fit(data, edmd.basis_from_data(data, Choice("total", 2)))
-    assert found.solved_by == "QR"
-    assert found.rank == found.directions == 14
-    assert found.condition > 1e4
+    assert found.regression.solved_by == "QR"
+    assert found.regression.rank == found.regression.directions == 14
+    assert found.regression.condition > 1e4
     x, u, x_next = next(Transitions.of(data).blocks(400))
     V = np.hstack([found.lift(x), u / 1e4])
     best = V @ np.linalg.lstsq(V, x_next, rcond=1e-13)[0]
@@ -133,8 +133,8 @@ def test_several_records_are_fitted_as_one(data, plant, basis):
     both = trajectories_of(plant, box_sample(300), 7)
     halves = [replace(both, x=both.x[rows], u=both.u[rows], course=None) for rows in (slice(0, 100), slice(100, 300))]
     one, two = edmd.fit(replace(both, course=None), basis), edmd.fit(halves, basis)
-    assert pytest.approx(one.A, rel=1e-9, abs=1e-12) == two.A
-    assert pytest.approx(one.B, rel=1e-9, abs=1e-12) == two.B
+    assert pytest.approx(one.dynamics.A, rel=1e-9, abs=1e-12) == two.dynamics.A
+    assert pytest.approx(one.dynamics.B, rel=1e-9, abs=1e-12) == two.dynamics.B
 
 
 def test_records_that_differ_are_not_fitted_together(data):
@@ -178,9 +178,9 @@ def test_an_input_that_stands_still_through_many_blocks_moves_nothing(plant, sti
     inputs[..., 2] = still
     data = trajectories_of(plant, replace(sample, inputs=inputs), 1)
     found = edmd.fit(data, edmd.basis_from_data(data, Choice("total", 1)))
-    assert found.rank == found.directions == 7
-    assert not found.B[:, 2].any()
-    assert found.condition < 10
+    assert found.regression.rank == found.regression.directions == 7
+    assert not found.dynamics.B[:, 2].any()
+    assert found.regression.condition < 10
 
 
 def test_a_survey_in_parts_is_the_survey(data):

@@ -133,14 +133,14 @@ def test_the_fit_is_the_least_squares_solution_written_out(spiral, boundary):
     x = np.array(spiral.x) + 0.1 * rng.standard_normal(spiral.x.shape)
     data = replace(spiral, x=x)
     predictor = eigen_fit(data, **{"degree": 1, "boundary": boundary, "tabulated": 40, "centres": 6, "cut": 1e-13})
-    V = exponentials(predictor.A.rates, 0.01 * np.arange(61.0))
+    V = exponentials(predictor.dynamics.modes.rates, 0.01 * np.arange(61.0))
     if boundary == "optimal":
         expected = np.einsum("kl,jls->jks", V, np.linalg.pinv(V) @ x)
     else:
         g = thin_plate(x[:, 0], draw_centres(x, 6, 0), np.ones(3))
         W = np.kron(g, V)
         expected = (W @ np.linalg.lstsq(W, x.reshape(-1, 3), rcond=None)[0]).reshape(x.shape)
-    assert predictor.rank == predictor.directions
+    assert predictor.regression.rank == predictor.regression.directions
     for j in range(0, 25, 5):
         assert predictor.predict(x[j, 0], steps=20) == pytest.approx(expected[j, :21], abs=1e-9)
         assert predictor.predict(x[j, 40], steps=20) == pytest.approx(expected[j, 40:], abs=1e-9)
@@ -149,7 +149,7 @@ def test_the_fit_is_the_least_squares_solution_written_out(spiral, boundary):
 def test_complex_rates_at_a_tabulated_sample(spiral):
     """z is carried on by A, and A by e^{λt}: C A^k from sample k0 is the fit at k0 + k."""
     predictor = eigen_fit(spiral, **{"degree": 2, "boundary": "optimal", "tabulated": 30, "cut": 1e-9})
-    assert (predictor.A.rates.imag != 0).any()
+    assert (predictor.dynamics.modes.rates.imag != 0).any()
     start = predictor.predict(spiral.x[:, 0], steps=30)
     assert predictor.predict(spiral.x[:, 12], steps=18) == pytest.approx(start[:, 12:], abs=1e-9)
 
@@ -244,7 +244,7 @@ def test_the_figure_the_paper_prints(full):
     """23 ± 15 %: thin-plate splines, raw, as the text says; and the share of the worst states where data are few."""
     predictor = eigen_fit(full("ctu-2020"), **{"cut": 1e-14})
     assert predictor.functions == 4410
-    assert predictor.A.rates.real[1:4] == pytest.approx(REFERENCE["rates"]["ctu-2020"], abs=5e-4)
+    assert predictor.dynamics.modes.rates.real[1:4] == pytest.approx(REFERENCE["rates"]["ctu-2020"], abs=5e-4)
     figures = evaluate(predictor, full("ctu-2020", seed=0), slice(None), 0, relift=False).figures()
     assert figures["rmse"]["mean"] == pytest.approx(22.95, abs=0.1)
     assert figures["rmse"]["std"] == pytest.approx(13.73, abs=0.1)
@@ -271,7 +271,7 @@ def test_the_cut_decides_the_figure(full, rank):
     kept = int(rank)
     cut = 0.9 * singular[kept - 1] / singular[0]
     predictor = eigen_fit(training, **{"boundary": "optimal", "cut": cut})
-    assert predictor.rank == kept
+    assert predictor.regression.rank == kept
     figures = evaluate(predictor, full("ctu-2020", seed=0), slice(None), 0, relift=False).figures()
     assert figures["rmse"]["mean"] == pytest.approx(REFERENCE["ranks"][rank], rel=0.01)
 
@@ -307,7 +307,7 @@ def test_started_at_a_tabulated_sample_it_is_the_directly_evaluated_fit(full, se
     """
     training = full("ctu-2020")
     predictor = eigen_fit(training, **{**settings})
-    modes, copies = predictor.A, predictor.A.copies
+    modes, copies = predictor.dynamics.modes, predictor.dynamics.modes.copies
     L, k0, rows = len(modes.rates), 60, np.arange(0, 441, 63)
     found = predictor.predict(np.asarray(training.x[rows, k0]), steps=50)
     (found_nodes, _), nodes = (

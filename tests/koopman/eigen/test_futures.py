@@ -82,8 +82,8 @@ def test_a_linear_system_is_predicted_as_well_as_exponentials_hold_it(linear, li
     inside = 0.5 * sampling.ball(5, 60)
     F = np.array([[-1.0, 4.0, 0.3], [-4.0, -1.0, 0.0], [0.0, 0.5, -2.0]])
     true = np.stack([inside @ expm(F * 0.01 * k).T for k in range(41)], axis=1)
-    assert rmse(predictor.predict(inside, steps=40), true).max() < 2 * predictor.missed + 1e-3
-    assert predictor.missed < 0.05
+    assert rmse(predictor.predict(inside, steps=40), true).max() < 2 * predictor.regression.missed + 1e-3
+    assert predictor.regression.missed < 0.05
     assert predictor.functions == 3 * 14
 
 
@@ -119,7 +119,7 @@ def test_it_survives_storage(rolling, lift):
     x0 = np.asarray(test.x)[:, 0]
     assert (again.predict(x0, steps=30) == predictor.predict(x0, steps=30)).all()
     assert (again.bound(x0) == predictor.bound(x0)).all()
-    assert (again.missed, again.beyond, again.horizon) == (predictor.missed, predictor.beyond, 30)
+    assert (again.regression.missed, again.beyond, again.horizon) == (predictor.regression.missed, predictor.beyond, 30)
     assert "A" not in predictor.pack().arrays
 
 

@@ -8,6 +8,7 @@ from koopcli.koopman import stored
 from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.predictor import responses
+from koopcli.koopman.predictor.regression import Regression
 from tests.conftest import grid_sample, trajectories_of
 
 
@@ -27,7 +28,7 @@ def test_the_fast_prediction_equals_the_rolled_one(predictor, start):
     x0, u = start
     z, rolled = predictor.lift(x0), [x0]
     for k in range(12):
-        z = z @ predictor.A.T + u[:, k] @ predictor.B.T
+        z = z @ predictor.dynamics.A.T + u[:, k] @ predictor.dynamics.B.T
         rolled.append(z @ predictor.C.T)
     rolled[0] = predictor.lift(x0) @ predictor.C.T
     assert predictor.predict(x0, u) == pytest.approx(np.stack(rolled, axis=1), rel=1e-10, abs=1e-10)
@@ -43,8 +44,8 @@ def test_the_length_of_a_segment_does_not_matter(predictor, start, segment, monk
 def test_an_infinite_condition_survives_storage(predictor):
     from dataclasses import replace
 
-    again = stored.predictor(replace(predictor, condition=np.inf).pack())
-    assert np.isinf(again.condition)
+    again = stored.predictor(replace(predictor, regression=Regression(1, 2, np.inf)).pack())
+    assert np.isinf(again.regression.condition)
 
 
 def test_one_trajectory_or_many(predictor, start):

@@ -1,0 +1,31 @@
+"""What is known of the regression behind a predictor."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from koopcli.records import Meta
+
+
+@dataclass(frozen=True)
+class Regression:
+    """How many of its ``directions`` the data determine (``rank``), its ``condition`` number, how it was ``solved_by``
+    (as :mod:`koopcli.koopman.edmd.blockwise` and ``product`` name it), and the share of the data in percent that the
+    exponentials do not represent, ``missed``, where there are any.
+    """
+
+    rank: int
+    directions: int
+    condition: float
+    solved_by: str = ""
+    missed: float | None = None
+
+    def pack(self) -> Meta:
+        """The facts for storage; an infinite condition is none."""
+        return {**vars(self), "condition": self.condition if math.isfinite(self.condition) else None}
+
+    @classmethod
+    def unpack(cls, meta: Meta) -> Regression:
+        """The inverse of :meth:`pack`."""
+        return cls(**{**meta, "condition": math.inf if meta["condition"] is None else meta["condition"]})
