@@ -94,3 +94,13 @@ def test_a_note_between_bars_is_the_text_itself(monkeypatch, terminal):
     with console.progress("work"):
         console.note("[red]:car:\x07")
     assert "[red]:car:�" in screen.getvalue()
+
+
+def test_lines_of_a_cell_stand_below_one_another():
+    file = io.StringIO()
+    show_table(["claim", "here"], [["first\nsecond", "1 %\n\x1b[2J"], ["third", "3 %"]], lines=True, file=file)
+    assert [line.split() for line in file.getvalue().splitlines()[-4:-1]] == [
+        ["first", "1", "%"],
+        ["second", "\ufffd[2J"],
+        ["third", "3", "%"],
+    ]

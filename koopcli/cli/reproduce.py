@@ -190,7 +190,7 @@ def _finish(
     for part in parts:
         for table in part.method.tables(part.runs):
             left = len(table.header) if table.words else table.left
-            show_table(table.header, table.rows, title=table.title, left=left, file=sys.stderr)
+            show_table(table.header, table.rows, title=table.title, left=left, lines=True, file=sys.stderr)
         for note in part.method.notes(part.runs):
             call.console.note(note)
         for one in part.illustrations:
