@@ -235,7 +235,7 @@ def _write_report(
             f"{part.method.title[0].upper()}{part.method.title[1:]}",
             part.method.tables(part.runs) if part.whole else [],
             part.method.notes(part.runs) if part.whole else [],
-            part.illustrations,
+            [one for one in part.illustrations if part.planned is None or one.drawing is not None],
             full_table(part.method, part.runs),
         )
         for part in parts

@@ -120,4 +120,4 @@ def _within(shown: ErrorMap) -> str:
     low, high = shown.ends
     if abs(low + high) < 0.05 * (high - low):
         return f"|{symbol(name)}| < {(high - low) / 2:.3g} {unit}"
-    return f"{low:.3g} < {symbol(name)} < {high:.3g} {unit}"
+    return f"{low:.3g} < {symbol(name)} < {high:.3g} {unit}".replace("-", "−")
