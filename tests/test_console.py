@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from koopcli.console import BETWEEN, LEAST, Console, cut_widths, show_line, show_table
+from koopcli.console import LEAST, Console, cut_widths, show_line, show_table
 
 HEADER = ["artefact", "pinned as", "settings", "took"]
 NAME = "fit-edmd/3f2a9c01d4e5"
@@ -67,9 +67,7 @@ def test_elsewhere_nothing_is_cut():
     file = io.StringIO()
     show_table(HEADER, [[NAME, "x" * 700, "order=7 " * 400, "1.2 s"]], file=file)
     (row,) = [line for line in lines(file) if NAME in line]
-    assert "x" * 700 in row
-    assert row.count("order=7") == 400
-    assert len(row.rstrip()) == len(NAME) + 700 + 8 * 400 + 5 + 3 * BETWEEN + 1
+    assert row.split() == [NAME, "x" * 700, *["order=7"] * 400, "1.2", "s"]
 
 
 def test_what_others_wrote_steers_no_terminal(terminal, capsys):
