@@ -77,12 +77,18 @@ def show_line(text: str, file: IO[str] | None = None) -> None:
 
 
 def show_table(
-    header: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = "", left: int = 1, file: IO[str] | None = None
+    header: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *,
+    title: str = "",
+    left: int = 1,
+    lines: bool = False,
+    file: IO[str] | None = None,
 ) -> None:
     """A table of texts on stdout or ``file``, its first ``left`` columns flush left.
 
     No row is ever folded. On a terminal the widest columns are cut to its width, but never the first, which has the
-    names; elsewhere nothing is cut.
+    names; elsewhere nothing is cut. With ``lines`` a cell may have several, and is folded instead of cut.
     """
     from rich.box import SIMPLE  # noqa: PLC0415
     from rich.cells import cell_len  # noqa: PLC0415
@@ -91,20 +97,25 @@ def show_table(
     from rich.text import Text  # noqa: PLC0415
 
     target = file or sys.stdout
-    columns = [[printable(cell) for cell in column] for column in zip(header, *rows, strict=True)]
-    widths = [max(map(cell_len, column)) for column in columns]
+    clean = _lines if lines else printable
+    columns = [[clean(cell) for cell in column] for column in zip(header, *rows, strict=True)]
+    widths = [max(cell_len(line) for cell in column for line in cell.split("\n")) for column in columns]
     between = BETWEEN * len(widths)
     if target.isatty():
         widths = cut_widths(widths, RichConsole(file=target).width - between)
     table = Table(box=SIMPLE, pad_edge=False)
     for i, (column, width) in enumerate(zip(columns, widths, strict=True)):
-        table.add_column(Text(column[0]), "left" if i < left else "right", width=width, no_wrap=True)
+        table.add_column(Text(column[0]), "left" if i < left else "right", width=width, no_wrap=not lines)
     for cells in zip(*(column[1:] for column in columns), strict=True):
         table.add_row(*map(Text, cells))
     console = RichConsole(file=target, width=sum(widths) + between)
     if title:
         console.print(Text(f"\n{printable(title)}", style="bold"), soft_wrap=True)
     console.print(table)
+
+
+def _lines(text: str) -> str:
+    return "\n".join(map(printable, text.split("\n")))
 
 
 def cut_widths(widths: Sequence[int], room: int) -> list[int]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 
 from koopcli.__main__ import main
 from koopcli.checks import COMMAND_LINE
@@ -26,6 +27,9 @@ from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
 from koopcli.vehicles.plants import Plant
 from koopcli.vehicles.single_track import ForceInput, SlipInput
 from tests import stock
+
+settings.register_profile("any load", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any load")
 
 TINY = """
 [sample.grid]

@@ -147,13 +147,15 @@ def _judge(call: Invocation, typed: Typed, task: Task, artefact: Artefact, other
         del one  # its scores may be many
     rows = [["this predictor", *_scores(artefact.figures)]]
     rows += [[NAMES[name], *_scores(found)] for name, found in figures.items()]
-    header = ["RMSE in %", "mean ± std", "median", "max", "mean, re-lifted", "mean, inside the data"]
+    header = ["RMSE in %", "mean ± std", "median", "max", "re-lifted", "inside"]
     show_table(header, rows, file=sys.stderr)
     for segment in artefact.figures.get("segments", []):
         call.console.note(f"from sample {segment['start']:>4}: RMSE {segment['rmse']:.4g} %")
     found = verdict(artefact.figures, figures)
     (call.console.note if found.beats else call.console.warn)(found.text)
-    told = None if found.beats else advice(typed, call, task, artefact.figures)
+    told = None
+    if not found.beats and not about["fitted_to_test_data"]:
+        told = advice(typed, call, task, artefact.figures)
     if told is not None:
         call.console.note(told)
     scores = {name: {"name": names[name], "rmse": figures[name]["rmse"]} for name in others}

@@ -190,7 +190,7 @@ def _finish(
     for part in parts:
         for table in part.method.tables(part.runs):
             left = len(table.header) if table.words else table.left
-            show_table(table.header, table.rows, title=table.title, left=left, file=sys.stderr)
+            show_table(table.header, table.rows, title=table.title, left=left, lines=True, file=sys.stderr)
         for note in part.method.notes(part.runs):
             call.console.note(note)
         for one in part.illustrations:
@@ -235,7 +235,7 @@ def _write_report(
             f"{part.method.title[0].upper()}{part.method.title[1:]}",
             part.method.tables(part.runs) if part.whole else [],
             part.method.notes(part.runs) if part.whole else [],
-            part.illustrations,
+            [one for one in part.illustrations if part.planned is None or one.drawing is not None],
             full_table(part.method, part.runs),
         )
         for part in parts

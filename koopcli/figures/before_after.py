@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from textwrap import fill
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -21,6 +22,7 @@ from koopcli.records import Array, Channels, FloatArray
 
 LEAST = 0.02  # quantile of all errors where the colours begin
 FAINTEST = 1e-6  # percent
+WIDE = 56  # letters of the titles of all columns
 VIEWS = ((0, 1), (1, 2))  # states across and up: from above, and from the side
 
 
@@ -69,7 +71,8 @@ def draw(shown: Sequence[Errors]) -> Figure:
         names = [axis_label(n, u) for n, u in zip(shown[0].channels.names, shown[0].channels.units, strict=True)]
         for one, column_ in zip(shown, panels.T, strict=True):
             mean = f"\nmean {one.rmse.mean():.3g} %" if len(one.rmse) else ""
-            column_[0].set_title(f"{plain(one.label)}{mean}", fontsize=8)
+            name = fill(plain(one.label), WIDE // len(shown))
+            column_[0].set_title(f"{name}{mean}", fontsize=8)
             colours = shades.to_rgba(np.maximum(one.rmse, low))
             for axes, (across, up) in zip(column_, VIEWS, strict=True):
                 at = one.x0[:, across], one.x0[:, up]

@@ -10,6 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d import Axes3D
 
 from koopcli.config.pictures import Plot
 from koopcli.figures.balls import Balls, balls, columns
@@ -78,6 +79,11 @@ def numbers(shown: ErrorMap) -> Mapping[str, Array]:
     }
 
 
+CUT, SPACE, BAR = (
+    (0.145, 0.17, 0.485, 0.74),
+    (0.65, 0.36, 0.285, 0.45),
+    (0.68, 0.17, 0.27, 0.03),
+)  # shares of the figure
 FROM_TO = ((0, "from"), (1, "to"))
 
 
@@ -90,15 +96,15 @@ def draw(shown: ErrorMap) -> Figure:
     through = shades.to_rgba(seen.rmse)
     through[:, 3] = PALEST + (1 - PALEST) * np.clip(seen.rmse / seen.top, 0, 1)
     with style():
-        figure = Figure(figsize=(COLUMN, 2.45), layout="constrained")
-        grid = figure.add_gridspec(2, 2, width_ratios=[1.75, 1], height_ratios=[1, 0.045])
-        cut = figure.add_subplot(grid[:, 0])
+        figure = Figure(figsize=(COLUMN, 2.45))
+        cut = figure.add_axes(CUT)
         cut.grid(visible=False)
         cut.pcolormesh(*shown.edges, shown.mean, cmap=SHADES, norm=scale, edgecolors="face", linewidth=0.1)
         cut.set_xlabel(names[ACROSS])
         cut.set_ylabel(names[UP])
         cut.set_title(f"mean where {_within(shown)}", fontsize=8)
-        space = figure.add_subplot(grid[0, 1], projection="3d")
+        space = Axes3D(figure, SPACE)
+        figure.add_axes(space)
         space.scatter(
             *seen.x0[:, :3].T, s=seen.sizes / 3, color=through, depthshade=False, linewidths=0, rasterized=True
         )
@@ -109,7 +115,7 @@ def draw(shown: ErrorMap) -> Figure:
             axis.set_ticklabels([])
             axis.labelpad = -17
             axis.set_rotate_label(axis is space.zaxis)
-        bar = figure.add_subplot(grid[1, 1])
+        bar = figure.add_axes(BAR)
         figure.colorbar(shades, cax=bar, orientation="horizontal", label="RMSE (%)", extend=seen.beyond)
     return figure
 
@@ -120,4 +126,4 @@ def _within(shown: ErrorMap) -> str:
     low, high = shown.ends
     if abs(low + high) < 0.05 * (high - low):
         return f"|{symbol(name)}| < {(high - low) / 2:.3g} {unit}"
-    return f"{low:.3g} < {symbol(name)} < {high:.3g} {unit}"
+    return f"{low:.3g} < {symbol(name)} < {high:.3g} {unit}".replace("-", "−")

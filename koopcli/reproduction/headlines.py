@@ -56,11 +56,11 @@ def _edmd_numbers(runs: Sequence[Run]) -> list[Number]:
     return found
 
 
-def _edmd_clause(run: Run) -> str:
+def _edmd_clause(run: Run) -> str | None:
     order = edmd_cells.best_order(run.experiment)
     linear, bilinear = _edmd(run, edmd_cells.excitation(run.experiment))
     if linear is None:
-        return "EDMD has no scores"
+        return None
     counted = f"{count_text(linear['functions'])} polynomials (EDMD, order {order})"
     stated = f"{BEST_RMSE} % is the paper's best" if order in BEST_ORDERS else f"the paper's best is {BEST_RMSE} %"
     said = f"Under random inputs, {counted} {_misses(linear)} ({stated})"
@@ -73,7 +73,7 @@ def _edmd_clause(run: Run) -> str:
 
 def _misses(figures: Meta) -> str:
     mean = figures["rmse"]["mean"]
-    return f"miss by {number_text(mean)} %" if math.isfinite(mean) else "diverge"
+    return f"miss by {number_text(mean)}\u00a0%" if math.isfinite(mean) else "diverge"
 
 
 def _edmd_race(experiment: Experiment) -> Race:
@@ -99,16 +99,16 @@ def _eigen_numbers(runs: Sequence[Run]) -> list[Number]:
         found.append(Number(f"eigenfunctions, {vehicle}", paper, here))
     main = [_eigen(run, vehicle=vehicles[0]) for run in runs]
     starts = ["–" if figures is None else number_text(figures["start_error"]["mean"]) for figures in main]
-    found.append(Number(f"error at the start, {vehicles[0]}", "seen", starts))
+    found.append(Number(f"error at the first sample, {vehicles[0]}", "not stated", starts))
     held = [_find(run, eigen_cells.BASELINES, vehicle=vehicles[0]) for run in runs]
-    found.append(Number("the first state held, which fits nothing", "–", [mean_text(figures) for figures in held]))
+    found.append(Number("baseline: the first state held", "–", [mean_text(figures) for figures in held]))
     return found
 
 
-def _eigen_clause(run: Run) -> str:
+def _eigen_clause(run: Run) -> str | None:
     figures = _eigen(run, vehicle=run.scored[0].cell.vehicle) if run.scored else None
     if figures is None:
-        return "eigenfunctions have no scores"
+        return None
     return f"eigenfunctions of a coasting car {_misses(figures)} (in the paper by {PAPER_EIGEN}\u00a0%)"
 
 
@@ -141,9 +141,9 @@ def _beyond_numbers(runs: Sequence[Run]) -> list[Number]:
     return found
 
 
-def _beyond_clause(run: Run) -> str:
+def _beyond_clause(run: Run) -> str | None:
     figures = _best(run, run.scored[0].cell.vehicle) if run.scored else None
-    return "best-eigen has no scores" if figures is None else f"those of best-eigen {_misses(figures)}"
+    return None if figures is None else f"those of best-eigen {_misses(figures)}"
 
 
 def _best(run: Run, vehicle: str) -> Meta | None:

@@ -76,7 +76,11 @@ def figure(shown: Illustration, *, brief: bool = False) -> Iterator[str]:
         many = len(shown.draws) > FOLDED_BEYOND
         if not brief and not many:
             yield command(shown.command)
-        origin = f"Made of {len(shown.draws)} evaluations by" if many else "Where it comes from"
+        origin = (
+            f"Made of {len(shown.draws)} evaluations: the command, and where it comes from"
+            if many
+            else "Where it comes from"
+        )
         yield f"<details><summary>{origin}</summary>"
         if brief or many:
             yield command(shown.command)

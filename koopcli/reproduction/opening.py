@@ -56,13 +56,22 @@ def race(methods: Sequence[Method], run: Run) -> Race:
 
 def opening(parts: Sequence[Part], ghosts: Shown | str, version: str) -> Opening:
     """The first screen of a report of ``parts``."""
-    run = parts[0].runs[0]
     dates = [scored.record.provenance["time"][:10] for part in parts for one in part.runs for scored in one.scored]
-    clauses = "; ".join(part.method.lead.clause(part.runs[0]) for part in parts)
-    about = [run.experiment.vehicle_name, f"computed {max(dates)}" if dates else "nothing computed", version]
+    clauses = "; ".join(clause for part in parts if (clause := part.method.lead.clause(part.runs[0])) is not None)
+    clauses = clauses or "none of the numbers of this screen was reached"
+    shown = numbers(parts)
+    about = [vehicles(parts, shown), f"computed {max(dates)}" if dates else "nothing computed", version]
     picture = lead_picture([one for part in parts for one in part.illustrations])
     sentence = f"{clauses[0].upper()}{clauses[1:]}."
-    return Opening(sentence, about, numbers(parts), picture, ghosts, list(missing(parts, ghosts)))
+    return Opening(sentence, about, shown, picture, ghosts, list(missing(parts, ghosts)))
+
+
+def vehicles(parts: Sequence[Part], shown: Table) -> str:
+    """The experiment's vehicle, and others that the numbers ``shown`` are of."""
+    cells = (scored.cell for part in parts for run in part.runs for scored in run.scored)
+    others = dict.fromkeys(str(getattr(cell, "vehicle", "")) for cell in cells)
+    named = [name for name in others if name and any(name in row[0] for row in shown.rows)]
+    return ", ".join(dict.fromkeys([parts[0].runs[0].experiment.vehicle_name, *named]))
 
 
 def numbers(parts: Sequence[Part]) -> Table:
@@ -74,7 +83,8 @@ def numbers(parts: Sequence[Part]) -> Table:
     rows = []
     for number, part in zip(chosen, _owners(each, parts, chosen), strict=True):
         here = dict(zip((run.label for run in part.runs), number.here, strict=True))
-        rows.append([number.label, number.paper, *(here.get(label, "–") for label in labels), number.unit])
+        if part.whole or any(text != "–" for text in here.values()):
+            rows.append([number.label, number.paper, *(here.get(label, "–") for label in labels), number.unit])
     return Table("RMSE, mean ± standard deviation", ["RMSE, mean ± deviation", "paper", *labels, ""], rows)
 
 

@@ -93,11 +93,11 @@ class Race:
 @dataclass(frozen=True)
 class Lead:
     """What a method has to say on the first screen: its ``numbers``, the most telling first, a ``clause`` of the one
-    sentence, and the ``race`` of its predictors.
+    sentence or None without scores, and the ``race`` of its predictors.
     """
 
     numbers: Callable[[Sequence[Run]], list[Number]]
-    clause: Callable[[Run], str]
+    clause: Callable[[Run], str | None]
     race: Callable[[Experiment], Race]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
 from koopcli.progress import Progress, silent
@@ -67,7 +69,8 @@ def _sample(rhs: Rhs, x: FloatArray, u: FloatArray, dt: float) -> tuple[FloatArr
     from scipy.integrate import solve_ivp  # noqa: PLC0415  (half a second that only this solver needs)
 
     try:
-        with np.errstate(over="ignore", invalid="ignore"):  # of one that ends for it
+        with np.errstate(over="ignore", invalid="ignore"), warnings.catch_warnings():  # of one that ends for it
+            warnings.simplefilter("ignore")
             found = solve_ivp(counted, (0.0, dt), x, method="LSODA", rtol=RELATIVE, atol=ABSOLUTE)
     except _StuckError:
         return x, FAILED

@@ -18,6 +18,7 @@ from koopcli.stages.usable import roles_of
 from koopcli.store import Record, Store
 
 LINEAR = FitEdmd(basis="total", order=1)
+USELESS = 50.0  # percent of a trajectory's size
 NAMES = {
     "hold": "hold the first state",
     "linearisation": "linearisation at the first state",
@@ -87,7 +88,8 @@ def verdict(figures: Meta, others: Mapping[str, Meta]) -> Verdict:
         return Verdict(False, f"the predictor, with {mean:.4g} %, does not beat {named}")
     nearest = min(others, key=lambda name: _mean(others[name]))
     best = f"'{NAMES[nearest]}' has {_mean(others[nearest]):.4g} %"
-    return Verdict(True, f"the predictor, with {mean:.4g} %, beats every baseline: {best}")
+    caveat = f"; an error of {mean:.2g} % is of little use all the same" if mean > USELESS else ""
+    return Verdict(True, f"the predictor, with {mean:.4g} %, beats every baseline: {best}{caveat}")
 
 
 def _mean(figures: Meta) -> float:

@@ -261,6 +261,7 @@ def test_an_interrupted_run_has_a_report_of_what_there_is(koop, folder, reproduc
     page = Page(text)
     assert next(row[2] for row in page.tables[""] if row[0].startswith("EDMD")).count("±") == 1
     assert re.search(r"interrupted: [1-9]\d* of [1-9]\d* evaluations of eigenfunctions are here", text)
-    assert {figure["text"].partition(".")[0] for figure in page.figures} == {"Not drawn: the run was interrupted"}
+    assert page.figures == []
+    assert "could not be drawn: the run was interrupted" in text
     assert any(title.startswith("EDMD: paper versus here") for title in page.tables)  # nothing of it is missing
     assert not any(title.startswith("Eigenfunctions: paper") for title in page.tables)

@@ -61,8 +61,8 @@ def test_both_methods_have_four_numbers_of_the_tables_scores(plans):
     ]
     assert first.about == ["ctu-2020", "computed 2026-11-27", "koop 1"]
     assert first.sentence.count(". ") == 0
-    assert "3.30 %" in first.sentence
-    assert "23.1 %" in first.sentence
+    assert "3.30\u00a0%" in first.sentence
+    assert "23.1\u00a0%" in first.sentence
     assert first.picture is not None
     assert first.picture.leads
     assert not [text for text in first.missing if "leaves out" in text]
