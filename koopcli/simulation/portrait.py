@@ -100,7 +100,8 @@ def odd(values: Mapping[str, float | None]) -> Iterator[str]:
     for name, value in values.items():
         low, high, unit = USUAL[name]
         if value is not None and not low <= value <= high:
-            shown, doubt = ("", "") if unit == "1" else (f" {unit}", ": is its unit right?")
+            shown = "" if unit == "1" else f" {unit}"
+            doubt = "" if name == "peak grip" else ": is its unit right?"  # which has none
             yield f"{name} is {value:.4g}{shown}; road vehicles have {low:g} to {high:g}{doubt}"
 
 

@@ -99,6 +99,7 @@ def test_every_command_of_the_report_makes_its_figure(koop, stocked):
         assert (facts["name"], facts["cached"]) == (one["name"], True)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_drawn_does_not_cost_the_report(koop, folder, monkeypatch):
     monkeypatch.setattr(metrics, "diverged", lambda predicted, domain: np.ones(len(predicted), dtype=bool))
     few = ("reproduce.orders=[1]", "reproduce.excitations=['fresh']", "reproduce.draws=['even']")

@@ -251,7 +251,7 @@ def test_the_figure_the_paper_prints(full):
     assert figures["outside"] == 41
 
 
-@pytest.mark.parametrize("vehicle", ["ctu-2020", "rimac-2018"])
+@pytest.mark.parametrize("vehicle", ["ctu-2020", pytest.param("rimac-2018", marks=pytest.mark.slow)])
 def test_where_the_errors_are(full, vehicle):
     predictor = eigen_fit(full(vehicle), **{"boundary": "optimal", "cut": 1e-10})
     found = dmd_rates(full(vehicle).x, 0.01)
