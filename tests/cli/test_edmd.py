@@ -26,7 +26,7 @@ from tests.cli.test_errors import one_line
             24,
             marks=pytest.mark.slow,
         ),
-        (["--basis", "states"], 3),
+        pytest.param(["--basis", "states"], 3, marks=pytest.mark.slow),
         pytest.param(["--order", "2", "--solver", "cholesky-monomials"], 27, marks=pytest.mark.slow),
     ],
 )

@@ -152,6 +152,7 @@ def test_interrupted_it_goes_on(koop, monkeypatch):
     assert len([line for line in again.err.splitlines() if line.startswith("fit-edmd/") and "made in" in line]) == 2
 
 
+@pytest.mark.slow
 def test_other_methods_and_vehicles(koop):
     axes = ("--set", "fit-eigen.degree=1:2", "--set", "vehicle.name=ctu-2020,rimac-2018")
     made = koop("sweep", "fit-eigen", *axes, "--json")

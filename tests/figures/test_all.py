@@ -27,6 +27,9 @@ from koopcli.stages.drawn import MADE, TAKES, TOLD
 from tests.stages.toys import figure_records, figure_settings
 
 SKETCHES = ("single-track",)  # drawn without axes
+LONG_TO_DRAW = {"before-after", "trust", "trajectory", "random-input", "mean-trajectory"}
+QUICK = [name for name in FIGURES if name not in LONG_TO_DRAW]
+LONG = [pytest.param(name, "svg", marks=pytest.mark.slow) for name in FIGURES if name in LONG_TO_DRAW]
 EVALUATED = [name for name, kind in FIGURES.items() if kind.takes == "evaluation"]
 
 
@@ -63,7 +66,7 @@ def test_its_line_names_what_there_is(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "image"), [*((name, "svg") for name in FIGURES), *(("tyre", image) for image in ImageFormat.__args__)]
+    ("name", "image"), [*((name, "svg") for name in QUICK), *(("tyre", image) for image in ImageFormat.__args__), *LONG]
 )
 def test_the_same_records_give_the_same_bytes_and_leave_nothing_behind(name, image):
     """Text tells most: every number and every name that a figure makes up stands in an svg."""

@@ -355,6 +355,7 @@ def test_a_larger_ridge_shrinks(reduced):
     assert sizes[-1] < 0.2 * sizes[0]
 
 
+@pytest.mark.slow
 def test_the_textbooks_normal_equations_agree_while_they_last(plant):
     """On raw monomials they are right at order 4, and by order 9 nothing is left of them."""
     data = trajectories_of(plant, grid_sample(count=11, columns=2), 1)
@@ -501,7 +502,8 @@ def test_the_error_falls_with_the_order_and_then_stays(scored):
         assert max(means[5:], default=1.0) < 1.01 * min(means[5:], default=1.0)
 
 
-@pytest.mark.parametrize("draw", ["even", pytest.param("chebyshev", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("draw", ["even", "chebyshev"])
 def test_yaw_rate_on_even_points_to_order_ten(scored, tests, draw):
     figures = evaluate(scored[0](draw, 10, 0), tests["fresh"], slice(0, 1000), 1, relift=False).figures()
     assert figures["max_error"]["yaw_rate"] <= 1e-9
