@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -123,10 +124,21 @@ def stocks(tmp_path_factory) -> Path:
     return root
 
 
+REPRODUCED = (TINY, "reproduced", [["reproduce", "--json"]])
+
+
 @pytest.fixture(scope="session")
 def reproduced(stocks) -> Path:
     """A store with all that `koop reproduce` makes of the tiny experiment."""
-    return stock.obtain(stocks, TINY, "reproduced", [["reproduce", "--json"]])
+    return stock.obtain(stocks, *REPRODUCED)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def ahead(request, stocks) -> None:
+    """Of several processes that run tests the first begins that store at once, so that none waits for it later."""
+    needed = any("reproduced" in item.fixturenames for item in request.session.items)
+    if needed and os.environ.get("PYTEST_XDIST_WORKER") == "gw0":
+        threading.Thread(target=stock.obtain, args=(stocks, *REPRODUCED), daemon=True).start()
 
 
 @pytest.fixture
