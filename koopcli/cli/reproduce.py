@@ -70,10 +70,11 @@ def reproduce(
     """Reproduce the paper at full size and put its numbers beside those found here: EDMD over orders, training grids
     and test inputs; eigenfunctions over readings of the text, two tyres, cuts, grip and baselines.
 
-    The paper's claims about EDMD come first, each with a verdict and the command that shows it. Some two minutes and
-    700 MB for both on two cores. What --set changes is shown beside the unmodified run. It ends with report.html, whose
-    path is printed: one page that opens with the main numbers and an animation of the predictors, then has every figure
-    with the command that makes it, and the tables. All of it is pinned, with what it was made from.
+    The paper's claims about EDMD come first, each with a verdict and the command that shows it. Three to six minutes
+    and 700 MB for both, by the machine. What --set changes is shown beside the unmodified run. It ends with
+    report.html, whose path is printed: one page that opens with the main numbers and an animation of the predictors,
+    then has every figure with the command that makes it, and the tables. All of it is pinned, with what it was made
+    from.
 
     Example: koop reproduce eigen --set vehicle.mu_scale=0.8
     """
