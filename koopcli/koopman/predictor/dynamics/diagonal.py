@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from koopcli.content import Content
 from koopcli.koopman.predictor import responses
+from koopcli.koopman.predictor.dynamics.shared import Spectral
 from koopcli.koopman.predictor.lifts import Lift
 from koopcli.koopman.predictor.modes import ComplexArray, Modes
 from koopcli.progress import Progress
@@ -17,7 +17,7 @@ from koopcli.records import Array, BoolArray, Channels, FloatArray, Packed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagonal(Content):
+class Diagonal(Spectral):
     """``modes`` of (7.2), which none of the ``inputs`` moves; how many there are is all that is known of them."""
 
     modes: Modes
@@ -33,11 +33,6 @@ class Diagonal(Content):
     def eigenvalues(self) -> ComplexArray:
         """Those of one block."""
         return self.modes.eigenvalues
-
-    @property
-    def spectral_radius(self) -> float:
-        """The largest absolute value of the eigenvalues."""
-        return float(np.abs(self.eigenvalues).max())
 
     @property
     def acting(self) -> BoolArray:

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
-from koopcli.content import Content
 from koopcli.koopman.predictor import responses
-from koopcli.koopman.predictor.lifts import Lift
+from koopcli.koopman.predictor.dynamics.shared import Rolled
 from koopcli.koopman.predictor.modes import ComplexArray
-from koopcli.progress import Progress
 from koopcli.records import Array, BoolArray, Channels, FloatArray, Packed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Generator(Content):
+class Generator(Rolled):
     """K_0 and the K_i of (4.9), ``K`` (1 + n_u, N, N) in 1/s, and the sampling period ``dt`` in s."""
 
     K: FloatArray
@@ -35,11 +32,6 @@ class Generator(Content):
         """Those of exp(dt K_0)."""
         return np.exp(self.dt * np.linalg.eigvals(self.K[0]).astype(complex))
 
-    @cached_property
-    def spectral_radius(self) -> float:
-        """The largest absolute value of the eigenvalues."""
-        return float(np.abs(self.eigenvalues).max())
-
     @property
     def acting(self) -> BoolArray:
         """Which inputs have a K_i."""
@@ -49,14 +41,6 @@ class Generator(Content):
     def advance(self) -> responses.Advance:
         """The function of z (n, N) and u (n, n_u) to z⁺."""
         return responses.generator_step(self.K, self.dt)
-
-    def predict(self, lift: Lift, C: FloatArray, x0: FloatArray, u: FloatArray, progress: Progress) -> FloatArray:
-        """What acts on z changes with the input, so z itself is rolled."""
-        return responses.rolled(lift, self.advance, C, x0, u, progress)
-
-    def stepper(self, lift: Lift, C: FloatArray) -> Callable[[FloatArray, FloatArray], FloatArray]:
-        """C times the next z."""
-        return lambda x, u: np.asarray(self.advance(lift.lift(x), u) @ C.T)
 
     def pack(self, inputs: Channels) -> Packed:
         """K_0 and every K_i."""

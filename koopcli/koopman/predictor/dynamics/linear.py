@@ -9,8 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from koopcli.content import Content
 from koopcli.koopman.predictor import responses
+from koopcli.koopman.predictor.dynamics.shared import Spectral, of_inputs
 from koopcli.koopman.predictor.lifts import Lift
 from koopcli.koopman.predictor.modes import ComplexArray
 from koopcli.progress import Progress
@@ -18,7 +18,7 @@ from koopcli.records import Array, BoolArray, Channels, FloatArray, Packed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Linear(Content):
+class Linear(Spectral):
     """``A`` (N, N) and ``B`` (N, n_u) of (4.1)."""
 
     A: FloatArray
@@ -34,11 +34,6 @@ class Linear(Content):
     def eigenvalues(self) -> ComplexArray:
         """Those of A."""
         return np.linalg.eigvals(self.A).astype(complex)
-
-    @cached_property
-    def spectral_radius(self) -> float:
-        """The largest absolute value of A's eigenvalues."""
-        return float(np.abs(self.eigenvalues).max())
 
     @property
     def acting(self) -> BoolArray:
@@ -57,15 +52,10 @@ class Linear(Content):
     def pack(self, inputs: Channels) -> Packed:
         """A and B."""
         return Packed(
-            {"A": Array(self.A, ("lifted", "lifted"), "1"), "B": packed_inputs(self.B, inputs)}, {"kind": self.kind}
+            {"A": Array(self.A, ("lifted", "lifted"), "1"), "B": of_inputs(self.B, inputs)}, {"kind": self.kind}
         )
 
     @classmethod
     def unpack(cls, packed: Packed) -> Linear:
         """The inverse of :meth:`pack`."""
         return cls(packed.arrays["A"].values[...], packed.arrays["B"].values[...])
-
-
-def packed_inputs(B: FloatArray, inputs: Channels) -> Array:
-    """B with the units of its columns."""
-    return Array(B, ("lifted", "input"), ", ".join(f"1/({unit})" for unit in inputs.units))
