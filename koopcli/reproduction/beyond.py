@@ -10,6 +10,7 @@ import numpy as np
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.samples import BallSample, EllipsoidSample
+from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.koopman.predictor.trust import LEVEL
 from koopcli.reproduction import beyond_cells as blocks
 from koopcli.reproduction import headlines
@@ -204,9 +205,8 @@ def measure(pipeline: Pipeline, cell: blocks.Cell, task: Task) -> Mapping[str, f
     """
     fit = pipeline.make(task.input("predictor"))
     found: dict[str, float] = {"build": float(fit.record.provenance["seconds"])}
-    missed = getattr(fit.content, "missed", None)
-    if missed is not None:
-        found["missed"] = float(missed)
+    if isinstance(fit.content, Predictor) and fit.content.regression.missed is not None:
+        found["missed"] = fit.content.regression.missed
     if cell.block in (blocks.LADDER, blocks.BUDGETS, blocks.EDMD):
         test = pipeline.make(task.input("trajectories")).content
         x0, u = np.asarray(test.x[:, 0]), np.asarray(test.u[:])
