@@ -6,6 +6,7 @@ import hashlib
 import shlex
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -113,7 +114,8 @@ def reproduce(
                 parts.append(opening.Part(one, done, illustrate(plans[one.name], call.pipeline)))
             shown = ghosts.run(race, parts[0].runs[0].experiment, call.pipeline)
     except KeyboardInterrupt:
-        _show_what_there_is(call, method, list(plans.values()))
+        with suppress(KoopError):  # such as a full disk: it stays an interrupt
+            _show_what_there_is(call, method, list(plans.values()))
         raise
     _finish(call, method, parts, shown, racing, as_json=as_json)
 

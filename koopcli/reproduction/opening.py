@@ -28,8 +28,9 @@ class Part:
 
     @property
     def whole(self) -> bool:
-        """Whether every evaluation is there, without which its tables and notes cannot be written."""
-        return self.planned is None or self.planned == sum(len(run.scored) for run in self.runs)
+        """Whether every evaluation is there, and what is measured of it, without which there are no tables or notes."""
+        scored = sum(len(run.scored) for run in self.runs)
+        return self.planned is None or (self.method.measure is None and self.planned == scored)
 
 
 @dataclass(frozen=True)

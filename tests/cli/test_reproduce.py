@@ -6,9 +6,13 @@ import shlex
 
 import pytest
 
+from koopcli.cli import reproduce
 from koopcli.config.data import data_folder
 from koopcli.config.experiment import load_experiment
+from koopcli.errors import StorageError
 from koopcli.reproduction import edmd
+from koopcli.reproduction.opening import Part
+from koopcli.reproduction.registry import BEYOND, METHODS
 from koopcli.reproduction.report import Run, number_text
 from koopcli.stages import ahead
 from tests import stock
@@ -265,3 +269,17 @@ def test_an_interrupted_run_has_a_report_of_what_there_is(koop, folder, reproduc
     assert "could not be drawn: the run was interrupted" in text
     assert any(title.startswith("EDMD: paper versus here") for title in page.tables)  # nothing of it is missing
     assert not any(title.startswith("Eigenfunctions: paper") for title in page.tables)
+
+    def refuse(*_):
+        raise StorageError("the disk is full")
+
+    monkeypatch.setattr(reproduce, "_write_report", refuse)
+    assert koop("reproduce").code == 130  # an interrupt, whatever becomes of the report
+
+
+def test_what_is_measured_in_a_run_is_missing_where_it_stopped():
+    """A stopped run measures nothing, so what goes beyond the paper has no tables even with all scores there."""
+    run = Run("here", load_experiment("smoke", {}), ())
+    assert Part(METHODS["edmd"], [run], [], planned=0).whole
+    assert Part(BEYOND, [run], []).whole
+    assert not Part(BEYOND, [run], [], planned=0).whole
