@@ -10,9 +10,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from koopcli.vehicles.single_track import ForceInput
 
 from koopcli.config.experiment import load_experiment
-from koopcli.config.samples import BoxSample, GridSample
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
@@ -22,7 +22,8 @@ from koopcli.koopman.scores.evaluation import Evaluation, evaluate
 from koopcli.records import FloatArray, Sample, Trajectories
 from koopcli.simulation import sampling
 from koopcli.simulation.integrate import simulate
-from koopcli.vehicles.single_track import ForceInput
+from koopcli.simulation.samples.box import BoxSample
+from koopcli.simulation.samples.grid import GridSample
 
 ORDERS = (5, 6, 7, 8)
 EPS = float(np.finfo(float).eps)

@@ -5,15 +5,19 @@ from __future__ import annotations
 import math
 import sys
 import types
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from difflib import get_close_matches
 from functools import cache
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any, ClassVar, Literal, Self, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from koopcli.errors import InvalidValueError, KoopError, UsageError
+from koopcli.errors import InvalidValueError, KoopError, MisplacedError, UsageError
 
 T = TypeVar("T")
+Values = dict[str, Any]
+SEED_LIMIT = 2**63 - 1
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,58 @@ def from_file(path: object) -> Origin:
     return Origin(str(path), InvalidValueError)
 
 
+@dataclass(frozen=True)
+class Layer:
+    """Raw values of settings by their names, and where they came from."""
+
+    values: Mapping[str, Any]
+    origin: Origin = COMMAND_LINE
+
+    def only(self, belongs: Callable[[str, object], bool]) -> Layer:
+        """Those of the values that belong, by name and value."""
+        return Layer({key: value for key, value in self.values.items() if belongs(key, value)}, self.origin)
+
+
+class Choice:
+    """One of several kinds, each with settings of its own: a base class for the choice, a frozen dataclass for a kind.
+
+    The settings of a kind are declared by the class that uses them. They are named without it: ``order`` stands beside
+    ``basis`` and holds for the kinds that have it. The first line of a kind's docstring says in its help what it is.
+    ``afresh``: whether a change of the kind leaves behind what was set for the kind before, where one name means
+    different things in two kinds.
+    """
+
+    kind: ClassVar[str]
+    afresh: ClassVar[bool] = False
+
+    @classmethod
+    def kinds(cls) -> dict[str, type[Self]]:
+        """The kinds by name, in the order in which they were declared."""
+        named: dict[str, type[Self]] = {}
+        for sub in cls.__subclasses__():
+            named |= ({sub.kind: sub} if "kind" in vars(sub) else {}) | sub.kinds()
+        return named
+
+
+class Settings:
+    """Settings with choices, made and changed by the names that people write."""
+
+    @classmethod
+    def of(cls, **values: object) -> Self:
+        """Those with other ``values`` than the defaults, such as ``basis="total", order=5``; raises as ``build``."""
+        return build(cls, values)
+
+    def but(self, **values: object) -> Self:
+        """These with other ``values``; a kind that is changed keeps what is not at its default and both kinds have."""
+        return build_layers(type(self), [Layer(told(self)), Layer(values)])
+
+
+def import_files(package: str, folder: Sequence[str]) -> None:
+    """Import every file of the ``folder`` of a ``package``, which makes the kinds in them known."""
+    for file in iter_modules(folder):
+        import_module(f"{package}.{file.name}")
+
+
 def setting(
     default: Any = MISSING,
     *,
@@ -46,13 +102,82 @@ def setting(
     unit: str = "",
     unique: bool = False,
     empty: bool = False,
+    option: bool = False,
 ) -> Any:
     """A dataclass field with its documentation and bounds: ``low <= value``, ``above < value``, ``value <= high``.
 
-    ``unique``: a list without repetition; ``empty``: a list that may have no entry.
+    ``unique``: a list without repetition; ``empty``: a list that may have no entry; ``option``: the command of these
+    settings has an option for it.
     """
     meta = {"help": help, "low": low, "above": above, "high": high, "unit": unit, "unique": unique, "empty": empty}
+    meta["option"] = option
     return field(metadata=meta) if default is MISSING else field(default=default, metadata=meta)
+
+
+def taken_from(section: str) -> Any:
+    """A dataclass field that is no setting: its value is taken from another ``section`` of an experiment."""
+    return field(metadata={"section": section})
+
+
+def taken(cls: type) -> dict[str, str]:
+    """The fields of a settings class that are no settings, each with the section that it is taken from."""
+    return {f.name: f.metadata["section"] for f in fields(cls) if "section" in f.metadata}  # type: ignore[arg-type]
+
+
+@cache
+def choices(cls: type) -> dict[str, type[Choice]]:
+    """The settings of a class that are choices, each with its base class."""
+    bare = {name: without_none(hint) for name, hint in _hints(cls).items()}  # type: ignore[arg-type]
+    return {name: hint for name, hint in bare.items() if isinstance(hint, type) and issubclass(hint, Choice)}
+
+
+@cache
+def names_of(cls: type) -> tuple[str, ...]:
+    """The settings of ``cls`` and of all kinds that it can choose."""
+    own = [f.name for f in fields(cls) if "help" in f.metadata]  # type: ignore[arg-type]
+    of_kinds = [name for base in choices(cls).values() for kind in base.kinds().values() for name in names_of(kind)]
+    return tuple(dict.fromkeys([*own, *of_kinds]))
+
+
+def written(settings: Any) -> Values:
+    """Settings as plain values by their names: a choice by its kind, with the settings of that kind beside it."""
+    values: Values = {"kind": settings.kind} if isinstance(settings, Choice) else {}
+    for f in fields(settings):
+        value = getattr(settings, f.name)
+        if isinstance(value, Choice):
+            own = written(value)
+            values |= {f.name: own.pop("kind"), **own}
+        else:
+            values[f.name] = _written(value)
+    return values
+
+
+def told(settings: Any) -> Values:
+    """As :func:`written`, the settings alone that are not at their defaults."""
+    values: Values = {}
+    for f in fields(settings):
+        value = getattr(settings, f.name)
+        if isinstance(value, Choice):
+            values |= ({} if value.kind == getattr(f.default, "kind", "") else {f.name: value.kind}) | told(value)
+        elif value != f.default:
+            values[f.name] = value
+    return values
+
+
+def _written(value: Any) -> Any:
+    if is_dataclass(value):
+        return written(value)
+    return tuple(map(_written, value)) if isinstance(value, (list, tuple)) else value
+
+
+def restored(cls: type[T], values: Mapping[str, Any]) -> T:
+    """The inverse of :func:`written`; ``cls`` may be the base of a choice. Raises as :func:`build`."""
+    rest = dict(values)
+    if issubclass(cls, Choice):
+        cls = cls.kinds()[rest.pop("kind")]
+    hints = _hints(cls)  # type: ignore[arg-type]
+    beside = {name: coerce(hints[name], rest.pop(name), name, {}, COMMAND_LINE) for name in taken(cls) if name in rest}
+    return build_layers(cls, [Layer(rest)], beside=beside)
 
 
 def build(cls: type[T], values: Mapping[str, object], origin: Origin = COMMAND_LINE, prefix: str = "") -> T:
@@ -61,18 +186,164 @@ def build(cls: type[T], values: Mapping[str, object], origin: Origin = COMMAND_L
     Raises ``origin.misnamed`` for a key or an enumerated value that does not exist and ``InvalidValueError``
     for a missing key, a wrong type, a value out of bounds, nan or inf.
     """
-    declared = {f.name: f for f in fields(cls)}  # type: ignore[arg-type]
-    for key in values:
-        if key not in declared:
-            raise origin.misnamed(origin.say(f"unknown setting '{prefix}{key}'{candidates(key, declared)}"))
-    hints = _hints(cls)  # type: ignore[arg-type]  # classes are hashable
-    done: dict[str, object] = {}
-    for name, spec in declared.items():
-        if name in values:
-            done[name] = coerce(hints[name], values[name], f"{prefix}{name}", spec.metadata, origin)
-        elif spec.default is MISSING and spec.default_factory is MISSING:
-            raise InvalidValueError(origin.say(f"missing key '{prefix}{name}'"))
-    return cls(**done)
+    return build_layers(cls, [Layer(values, origin)], prefix)
+
+
+def build_layers(cls: type[T], layers: Sequence[Layer], prefix: str = "", beside: Mapping[str, Any] | None = None) -> T:
+    """As :func:`build`, from ``layers`` of which later ones win. ``beside`` them stand values of what is no setting."""
+    values = {**_checked(cls, layers, prefix), **(beside or {})}
+    for f in fields(cls):  # type: ignore[arg-type]
+        if f.name not in values and f.default is MISSING and f.default_factory is MISSING:
+            raise InvalidValueError(layers[-1].origin.say(f"missing key '{prefix}{f.name}'"))
+    return cls(**values)
+
+
+def chosen_kind(kinds: Mapping[str, type[Choice]], layers: Sequence[Layer], usual: str | None) -> str:
+    """The kind that the last of the ``layers`` names, else the ``usual`` one."""
+    named = [str(layer.values["kind"]) for layer in layers if "kind" in layer.values]
+    return named[-1] if named else str(usual)
+
+
+def choose(
+    kinds: Mapping[str, type[Choice]],
+    layers: Sequence[Layer],
+    usual: str | None,
+    prefix: str,
+    what: str,
+    beside: Mapping[str, Any] | None = None,
+) -> Any:
+    """The choice of one of ``kinds``, the ``usual`` one unless a layer names another, with its settings.
+
+    A layer may have the name of a ``kind``, a table for a kind, in effect or not, and settings without a table, which
+    hold for the kinds that have them. ``what`` is chosen, in words. Raises as :func:`build`, and for a setting that
+    the kind in effect in its layer does not have.
+    """
+    check_choice(kinds, layers, usual, prefix, what)
+    kind = chosen_kind(kinds, layers, usual)
+    first, before = 0, usual
+    for i, layer in enumerate(layers):
+        now = layer.values.get("kind", before)
+        if now != before and kinds[kind].afresh:
+            first = i
+        before = now
+    own = []
+    for i, layer in enumerate(layers):
+        table = layer.values[kind] if _is_table(kind, layer.values.get(kind), kinds) else {}
+        known = names_of(kinds[kind]) if i >= first else ()
+        beside_it = layer.only(lambda key, value: key in known and not _is_table(key, value, kinds))  # noqa: B023
+        own.append(Layer({**table, **beside_it.values}, layer.origin))
+    return build_layers(kinds[kind], own, prefix, {name: (beside or {})[name] for name in taken(kinds[kind])})
+
+
+def check_choice(
+    kinds: Mapping[str, type[Choice]], layers: Sequence[Layer], usual: str | None, prefix: str, what: str
+) -> None:
+    """Refuse what no kind would take, whichever is in effect in the end, and what the kind of its layer does not have.
+
+    ``usual``: None where it is not known yet.
+    """
+    kind = usual
+    for layer in layers:
+        kind = layer.values.get("kind", kind)
+        tables = [key for key, value in layer.values.items() if isinstance(value, Mapping) and not _any_has(kinds, key)]
+        for name in [*([] if kind is None else [kind]), *tables]:
+            if not isinstance(name, str) or name not in kinds:
+                raise layer.origin.misnamed(
+                    layer.origin.say(f"unknown kind of {what} {_short(repr(name))}{candidates(str(name), kinds)}")
+                )
+        for key, value in layer.values.items():
+            if _is_table(key, value, kinds):
+                for name in value:
+                    _check_owner(kinds, key, name, layer.origin, f"{prefix}{key}.", what)
+                _checked(kinds[key], [Layer(value, layer.origin)], f"{prefix}{key}.")
+            elif key != "kind":
+                _check_loose(kinds, kind, Layer({key: value}, layer.origin), prefix, what)
+
+
+def _check_loose(kinds: Mapping[str, type[Choice]], kind: str | None, layer: Layer, prefix: str, what: str) -> None:
+    """Refuse a setting without a table that the ``kind`` in effect, else every kind, does not take."""
+    (key,) = layer.values
+    if kind is not None:
+        _check_owner(kinds, kind, key, layer.origin, prefix, what)
+    owners = [name for name, cls in kinds.items() if key in names_of(cls)] or list(kinds)
+    refused = []
+    for owner in [kind] if kind is not None else owners:
+        try:
+            _checked(kinds[owner], [layer], prefix)
+        except KoopError as error:
+            refused.append(error)
+        else:
+            return
+    raise max(refused, key=lambda error: isinstance(error, InvalidValueError))
+
+
+def _check_owner(
+    kinds: Mapping[str, type[Choice]], kind: str, key: str, origin: Origin, prefix: str, what: str
+) -> None:
+    """Refuse a setting of other kinds than the ``kind`` at hand."""
+    owners = [name for name, cls in kinds.items() if key in names_of(cls)]
+    if owners and kind not in owners:
+        whose = " or ".join(f"'{owner}'" for owner in owners)
+        text = origin.say(f"'{prefix}{key}' belongs to {what} {whose}, and this {what} is '{kind}'")
+        raise MisplacedError(text, f"{prefix}{key}") if origin.misnamed is UsageError else origin.misnamed(text)
+
+
+def _any_has(kinds: Mapping[str, type[Choice]], key: str) -> bool:
+    return any(key in names_of(cls) for cls in kinds.values()) and key not in kinds
+
+
+def _is_table(key: str, value: object, kinds: Mapping[str, Any]) -> bool:
+    return isinstance(value, Mapping) and key in kinds
+
+
+def _checked(cls: type, layers: Sequence[Layer], prefix: str) -> Values:
+    """The values of those settings of ``cls`` that ``layers`` give, each coerced to its declared type."""
+    for layer in layers:
+        for key in layer.values:
+            if key in taken(cls):
+                raise layer.origin.misnamed(layer.origin.say(_elsewhere(f"{prefix}{key}", key, taken(cls)[key])))
+            if key not in _own(cls) and key not in names_of(cls):
+                raise layer.origin.misnamed(
+                    layer.origin.say(f"unknown setting '{prefix}{key}'{candidates(key, names_of(cls))}")
+                )
+    values: Values = {}
+    for f in fields(cls):  # type: ignore[arg-type]
+        if f.name in choices(cls):
+            values |= _checked_choice(cls, f.name, layers, prefix)
+            continue
+        for layer in layers:
+            if f.name in layer.values:
+                value, hint = layer.values[f.name], _hints(cls)[f.name]  # type: ignore[arg-type]
+                values[f.name] = coerce(hint, value, f"{prefix}{f.name}", f.metadata, layer.origin)
+    return values
+
+
+def _checked_choice(cls: type, name: str, layers: Sequence[Layer], prefix: str) -> Values:
+    """The choice ``name`` of ``cls``, whose settings stand beside it or in a table of its own."""
+    kinds, default = choices(cls)[name].kinds(), cls.__dataclass_fields__[name].default  # type: ignore[attr-defined]
+    of_kinds = {key for kind in kinds.values() for key in names_of(kind)}
+    own = []
+    for layer in layers:
+        given = layer.values.get(name, {})
+        if isinstance(given, Choice):
+            return {name: given}
+        table = given if isinstance(given, Mapping) else {"kind": given}
+        beside = {key: value for key, value in layer.values.items() if key in of_kinds and key not in _own(cls)}
+        own.append(Layer({**table, **beside}, layer.origin))
+    if default is None and not any("kind" in layer.values for layer in own):
+        check_choice(kinds, own, None, prefix, name)
+        return {}
+    return {name: choose(kinds, own, getattr(default, "kind", None), prefix, name)}
+
+
+def _own(cls: type) -> set[str]:
+    return {f.name for f in fields(cls)}  # type: ignore[arg-type]
+
+
+def _elsewhere(name: str, key: str, section: str) -> str:
+    """What is said of a value that is taken from another section."""
+    remedy = f"choose it by {key}.name" if key == "vehicle" else f"set {section}.{key}"
+    return f"'{name}' is {'the vehicle' if 'vehicle' in (key, section) else 'the simulation'}'s: {remedy}"
 
 
 @cache
@@ -81,9 +352,15 @@ def _hints(cls: type) -> dict[str, Any]:
     return get_type_hints(cls)
 
 
-def coerce(  # noqa: PLR0911  (one return for each kind of type reads best)
-    kind: Any, value: object, name: str, bounds: Mapping[str, Any], origin: Origin
-) -> object:
+def without_none(hint: Any) -> Any:
+    """The type of a setting where it has a value."""
+    if get_origin(hint) not in (Union, types.UnionType):
+        return hint
+    (inner,) = [part for part in get_args(hint) if part is not type(None)]
+    return inner
+
+
+def coerce(kind: Any, value: object, name: str, bounds: Mapping[str, Any], origin: Origin) -> object:
     """``value`` as the declared type ``kind``, so that 1 and 1.0 are one setting; bounds checked."""
     if isinstance(kind, type) and is_dataclass(kind):
         if isinstance(value, Mapping):
@@ -94,10 +371,7 @@ def coerce(  # noqa: PLR0911  (one return for each kind of type reads best)
     if get_origin(kind) is Literal:
         return _choice(get_args(kind), value, name, origin)
     if get_origin(kind) in (Union, types.UnionType):
-        if value is None:
-            return None
-        (inner,) = [k for k in get_args(kind) if k is not type(None)]
-        return coerce(inner, value, name, bounds, origin)
+        return None if value is None else coerce(without_none(kind), value, name, bounds, origin)
     if get_origin(kind) is tuple:
         inner = get_args(kind)[0]
         if isinstance(value, str) and get_origin(inner) is Literal:

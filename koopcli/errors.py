@@ -13,6 +13,14 @@ class UsageError(KoopError):
     exit_code = 2
 
 
+class MisplacedError(UsageError):
+    """A ``setting`` that exists, of another kind than the one that was chosen."""
+
+    def __init__(self, text: str, setting: str) -> None:
+        super().__init__(text)
+        self.setting = setting
+
+
 class InvalidValueError(KoopError):
     """A value out of range, not a number, or a user's file that cannot be used."""
 

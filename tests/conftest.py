@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
+from koopcli.vehicles.single_track import ForceInput, SlipInput
 
 from koopcli.__main__ import main
 from koopcli.checks import COMMAND_LINE
@@ -26,7 +27,6 @@ from koopcli.stages.registry import STAGES
 from koopcli.store import Store
 from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
 from koopcli.vehicles.plants import Plant
-from koopcli.vehicles.single_track import ForceInput, SlipInput
 from tests import stock
 
 settings.register_profile("any load", deadline=None, suppress_health_check=[HealthCheck.too_slow])

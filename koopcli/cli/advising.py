@@ -159,12 +159,11 @@ def _stays(name: str, better: Better) -> bool:
 
 def _does(fit: Task, call: Invocation, evaluation: Task, better: Better) -> bool:
     """Whether a predictor can be made and scored, is of the plant and vehicle at hand, and covers states as fast."""
-    from koopcli.config.words import OF_PLANT
     from koopcli.stages import recipes
 
     known = next(task for task in evaluation.input("predictor").upstream() if task.stage == "simulate")
     mine, theirs = (task.ancestor("simulate") for task in (fit, known))
-    for name in ("plant", "vehicle", *OF_PLANT):
+    for name in ("plant", "vehicle", "dt"):
         if getattr(mine.settings, name) != getattr(theirs.settings, name):
             return False
     samples = [task.ancestor("sample").settings for task in (mine, theirs)]

@@ -8,7 +8,70 @@ from typing import Annotated, Any
 import typer
 
 import koopcli
-from koopcli.cli import command, comparing, keeping, looking, making, plotting, reproduce, sweeping, vehicles
+from koopcli.cli.lazy import Entry, group_of
+
+REPRODUCE, MAKE, LOOK = "Reproduce", "Make", "Look into the store and after it"
+COMMANDS = (
+    Entry(
+        "reproduce",
+        "reproduce",
+        REPRODUCE,
+        "Reproduce the paper at full size and put its numbers beside those found here: EDMD over orders, training "
+        "grids and test inputs; eigenfunctions over readings of the text, two tyres, cuts, grip and baselines.",
+    ),
+    Entry("sample", "making", MAKE, "Draw or lay out initial states and inputs."),
+    Entry("simulate", "making", MAKE, "Simulate trajectories of a vehicle from a sample."),
+    Entry(
+        "fit-edmd",
+        "fitting",
+        MAKE,
+        "Fit a Koopman predictor z⁺ = A z + B u, x̂ = C z by extended dynamic mode decomposition.",
+    ),
+    Entry(
+        "fit-eigen",
+        "fitting",
+        MAKE,
+        "Fit a Koopman predictor whose lifted states are eigenfunctions, built from trajectories without inputs.",
+    ),
+    Entry("baseline", "fitting", MAKE, "Make a baseline: a prediction without any fit, which a predictor has to beat."),
+    Entry(
+        "evaluate",
+        "evaluating",
+        MAKE,
+        "Score a predictor on test trajectories of its own plant and vehicle: RMSE, re-lifted RMSE, largest errors.",
+    ),
+    Entry("sweep", "sweeping", MAKE, "Fit and score a predictor for every combination of some settings."),
+    Entry("plot", "plotting", MAKE, "Draw a figure of artefacts, making them when they are not named."),
+    Entry("ls", "looking", LOOK, "List the artefacts of the store, oldest first."),
+    Entry(
+        "show",
+        "looking",
+        LOOK,
+        "Show an artefact: its numbers, every setting behind it, its arrays, and how it was made.",
+    ),
+    Entry("path", "looking", LOOK, "Print where the HDF5 file of an artefact lies, after verifying it."),
+    Entry(
+        "diff",
+        "comparing",
+        LOOK,
+        "Compare two artefacts: every setting behind them, their arrays, and the small facts beside those.",
+    ),
+    Entry("pin", "keeping", LOOK, "Mark an artefact to be kept."),
+    Entry("unpin", "keeping", LOOK, "Take back a pin, of one artefact or of a reproduction."),
+    Entry(
+        "verify",
+        "keeping",
+        LOOK,
+        "Check the artefacts of the store for damage. Without --repair nothing is changed.",
+    ),
+    Entry(
+        "gc",
+        "keeping",
+        LOOK,
+        "Remove artefacts that nobody keeps: neither pinned, nor young, nor behind any such artefact.",
+    ),
+    Entry("vehicle", "vehicles", LOOK, "Look into vehicle files: their parameters and what follows from them."),
+)
 
 FIRST = (
     ("koop reproduce", "the paper's results"),
@@ -21,6 +84,7 @@ LINES = "\n".join(f"{command:<57}{gives}" for command, gives in FIRST)
 
 app = typer.Typer(
     name="koop",
+    cls=group_of(COMMANDS),
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
@@ -29,21 +93,17 @@ app = typer.Typer(
     "keeps everything in a store and reuses it. Defaults stand in parentheses. They are the paper's; an --experiment "
     "file or --set changes any of them.",
 )
-reproduce.register(app)
-making.register(app)
-sweeping.register(app)
-plotting.register(app)
-looking.register(app)
-comparing.register(app)
-keeping.register(app)
-vehicles.register(app)
-command.prepare(app)
 
 
 @cache
 def root() -> Any:
-    """The command ``koop``, built once a process."""
+    """The command ``koop``, built once a process, whose commands are imported when they are called."""
     return typer.main.get_command(app)
+
+
+def whole() -> dict[str, Any]:
+    """All commands by name, imported."""
+    return {entry.name: root().load(entry.name) for entry in COMMANDS}
 
 
 def _version(wanted: bool) -> None:

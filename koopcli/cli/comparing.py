@@ -155,4 +155,4 @@ def _short(value: object) -> str:
 
 def register(app: typer.Typer) -> None:
     """Add the commands of this file."""
-    app.command("diff", rich_help_panel="Look into the store and after it")(diff)
+    app.command("diff")(diff)

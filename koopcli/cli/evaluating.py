@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from koopcli.cli import fitting
 from koopcli.cli.advising import TEST, Typed, advice
 from koopcli.cli.completion import complete_name
-from koopcli.cli.invocation import Invocation, begin
+from koopcli.cli.derived import options_of
+from koopcli.cli.invocation import DATA, Invocation, begin
 from koopcli.cli.options import (
     ClusterOption,
     DryRunOption,
@@ -21,12 +21,10 @@ from koopcli.cli.options import (
     StoreOption,
     VehicleOption,
     WorkersOption,
-    names,
 )
 from koopcli.config.changes import Changes, Values
-from koopcli.config.driving import DriveSample
-from koopcli.config.sampled import Excitation
-from koopcli.config.samples import BallSample, BoxSample
+from koopcli.config.experiment import KINDS, Experiment
+from koopcli.config.settings import Evaluate
 from koopcli.console import Console, show_table
 
 if TYPE_CHECKING:
@@ -36,6 +34,7 @@ if TYPE_CHECKING:
 FITS = ("experiment", "fit-edmd", "fit-eigen")  # the sections that choose and make a predictor
 
 
+@options_of(*KINDS["test"].values(), Evaluate, only=("excitation", "amplitude", "count", "steps", "seed", "restart"))
 def evaluate(
     context: typer.Context,
     predictor: Annotated[
@@ -49,37 +48,8 @@ def evaluate(
         str | None,
         typer.Option(autocompletion=complete_name, metavar="TRAJECTORIES", help="Test on these trajectories."),
     ] = None,
-    excitation: Annotated[
-        Excitation | None,
-        typer.Option(
-            metavar=names(Excitation),
-            help=f"Inputs of the test set (forces: {BoxSample.excitation}, wheels: {DriveSample.excitation}).",
-        ),
-    ] = None,
-    amplitude: Annotated[
-        float | None, typer.Option(help=f"forces: test inputs within ± amplitude, in N ({BoxSample.amplitude:g}).")
-    ] = None,
-    count: Annotated[
-        int | None,
-        typer.Option(help=f"Test trajectories ({BoxSample.count}; slips: {BallSample.count})."),
-    ] = None,
-    steps: Annotated[
-        int | None,
-        typer.Option(
-            help=f"Steps of each (forces: {BoxSample.steps}, slips: {BallSample.steps}, wheels: {DriveSample.steps})."
-        ),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option(help=f"Seed of the test set ({BoxSample.seed}; slips: {BallSample.seed})."),
-    ] = None,
-    restart: Annotated[
-        int | None,
-        typer.Option(
-            help="Start the prediction afresh from the true state every so many steps, and score each stretch. Of a "
-            "predictor driven by forces the test set is then the paper's trajectory under random inputs (kind point)."
-        ),
-    ] = None,
+    *,
+    given: Values,
     vehicle: VehicleOption = None,
     workers: WorkersOption = 1,
     cluster: ClusterOption = None,
@@ -99,26 +69,28 @@ def evaluate(
 
     Example: koop evaluate --experiment best-edmd --vehicle bmw-320i
     """
-    given: Values = {"excitation": excitation, "amplitude": amplitude, "count": count, "steps": steps, "seed": seed}
-    changes: Changes = {"test": given, "evaluate": {"restart": restart}, "vehicle": {"name": vehicle}}
-    call = begin(store, experiment, set_, (*fitting.DATA, *FITS, *TEST), changes, workers, cluster)
+    scored = {name: given.pop(name) for name in ("restart",) if name in given}
+    changes: Changes = {"test": given, "evaluate": scored, "vehicle": {"name": vehicle}}
+    call = begin(store, experiment, set_, (*DATA, *FITS, *TEST), changes, workers, cluster)
     from koopcli.stages import recipes
     from koopcli.stages.verdict import beside
 
     of = call.optional(predictor, recipes.FITS, "the PREDICTOR", TEST)
     elsewhere = [section for section in call.changes if section != "test"]
     test = call.optional(on, ["simulate"], "--on", elsewhere)
-    if of is not None and test is None:
-        test = recipes.test_set(call.experiment, call.simulated(of))
-    task = recipes.evaluation(call.experiment, of, test)
+
+    def evaluation(experiment: Experiment) -> Task:
+        on = recipes.test_set(experiment, call.simulated(of)) if of is not None and test is None else test
+        return recipes.evaluation(experiment, of, on)
+
+    task = evaluation(call.experiment)
     others = beside(call.experiment, task)
     typed = Typed.of(context)
     call.run(
-        task,
+        evaluation,
         as_json=as_json,
         dry_run=dry_run,
         extra=lambda artefact: _judge(call, typed, task, artefact, others),
-        reads=recipes.CHOSEN if of is None else (),
         also=list(others.values()),
     )
 
@@ -184,4 +156,4 @@ class _Unwarned:
 
 def register(app: typer.Typer) -> None:
     """Add the command of this file."""
-    app.command("evaluate", rich_help_panel="Make")(evaluate)
+    app.command("evaluate")(evaluate)

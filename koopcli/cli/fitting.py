@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, get_args
+from typing import Annotated
 
 import typer
 
 from koopcli.cli.completion import complete_name
-from koopcli.cli.invocation import begin
+from koopcli.cli.derived import options_of
+from koopcli.cli.invocation import DATA, begin
 from koopcli.cli.options import (
     ClusterOption,
     DryRunOption,
@@ -19,26 +20,13 @@ from koopcli.cli.options import (
     WorkersOption,
     names,
 )
-from koopcli.config.changes import Changes, Values
-from koopcli.config.sampled import Mirror
-from koopcli.config.settings import (
-    BaselineKind,
-    BasisName,
-    Boundary,
-    Coordinates,
-    Eigenvalues,
-    FitEdmd,
-    FitEigen,
-    LiftName,
-    Placement,
-    Solver,
-    Terms,
-    Window,
-)
-
-DATA = ("sample", "vehicle", "simulate")  # the sections behind trajectories
+from koopcli.config.changes import Values
+from koopcli.config.settings import BaselineKind
+from koopcli.koopman.edmd.fit import FitEdmd
+from koopcli.koopman.eigen.fit import FitEigen
 
 
+@options_of(FitEdmd)
 def fit_edmd(
     trajectories: Annotated[
         list[str] | None,
@@ -48,52 +36,9 @@ def fit_edmd(
             help="Trajectories, or several of one plant to fit together; made from the settings when left out.",
         ),
     ] = None,
-    order: Annotated[int | None, typer.Option(help=f"Highest degree of each state ({FitEdmd.order}).")] = None,
+    *,
+    given: Values,
     vehicle: VehicleOption = None,
-    basis: Annotated[
-        BasisName | None,
-        typer.Option(
-            metavar=names(BasisName),
-            help="Family of observables: polynomials up to the order in each state (tensor), in total, or up to the "
-            "order in the yaw rate and to --degree-velocity in the velocity (anisotropic); thin-plate splines; the "
-            f"states alone, which is dynamic mode decomposition ({FitEdmd.basis}).",
-        ),
-    ] = None,
-    degree_velocity: Annotated[
-        int | None,
-        typer.Option(help=f"anisotropic: highest degree of v_x and v_y together ({FitEdmd.degree_velocity})."),
-    ] = None,
-    centres: Annotated[int | None, typer.Option(help=f"thin-plate: number of splines ({FitEdmd.centres}).")] = None,
-    placement: Annotated[
-        Placement | None,
-        typer.Option(
-            metavar=names(Placement),
-            help="thin-plate: centres at the means of clusters of the data, or drawn from a normal distribution with "
-            f"its mean and spread ({FitEdmd.placement}).",
-        ),
-    ] = None,
-    terms: Annotated[
-        Terms | None,
-        typer.Option(
-            metavar=names(Terms),
-            help="How inputs act: B u; B u and products u_i N_i z; or such a system in continuous time, whose held "
-            f"inputs act exactly ({FitEdmd.terms}).",
-        ),
-    ] = None,
-    ridge: Annotated[
-        float | None,
-        typer.Option(
-            help=f"Penalty on the coefficients, of scaled columns; the constant and B stay free ({FitEdmd.ridge:g})."
-        ),
-    ] = None,
-    solver: Annotated[
-        Solver | None,
-        typer.Option(
-            metavar=names(Solver),
-            help="Least squares in an orthonormal basis; cholesky-monomials solves the textbook's normal equations "
-            f"instead, to show where their digits end ({FitEdmd.solver}).",
-        ),
-    ] = None,
     workers: WorkersOption = 1,
     cluster: ClusterOption = None,
     set_: SetOption = None,
@@ -113,109 +58,29 @@ def fit_edmd(
 
     Example: koop fit-edmd --basis anisotropic --order 8 --terms bilinear
     """
-    fit: Values = {
-        "order": order,
-        "basis": basis,
-        "degree_velocity": degree_velocity,
-        "centres": centres,
-        "placement": placement,
-        "terms": terms,
-        "ridge": ridge,
-        "solver": solver,
-    }
-    given: Changes = {"fit-edmd": fit, "vehicle": {"name": vehicle}}
-    call = begin(store, experiment, set_, (*DATA, "fit-edmd"), given, workers, cluster)
+    call = begin(
+        store,
+        experiment,
+        set_,
+        (*DATA, "fit-edmd"),
+        {"fit-edmd": given, "vehicle": {"name": vehicle}},
+        workers,
+        cluster,
+    )
     from koopcli.stages import recipes
 
     of = [call.named(name, ["simulate"], "the TRAJECTORIES", ("fit-edmd",)) for name in trajectories or []]
-    call.run(recipes.fit_edmd(call.experiment, *of), as_json=as_json, dry_run=dry_run)
+    call.run(lambda experiment: recipes.fit_edmd(experiment, *of), as_json=as_json, dry_run=dry_run)
 
 
+@options_of(FitEigen)
 def fit_eigen(
     trajectories: Annotated[
         str | None,
         typer.Argument(autocompletion=complete_name, help="Trajectories; made from the settings when left out."),
     ] = None,
-    eigenvalues: Annotated[
-        Eigenvalues | None,
-        typer.Option(
-            metavar=names(Eigenvalues),
-            help="Rates of growth: sums of the data's own (dmd), as in the paper; a comb of frequencies, which needs "
-            f"no data; the best ones for the data, by variable projection ({FitEigen.eigenvalues}).",
-        ),
-    ] = None,
-    degree: Annotated[
-        int | None,
-        typer.Option(
-            help="dmd: rates are sums of up to this many of the data's three: 1, 2, 3 give 4, 10, 20 of them "
-            f"({FitEigen.degree})."
-        ),
-    ] = None,
-    pairs: Annotated[
-        int | None, typer.Option(help="comb, varpro: pairs of complex rates, beside two real ones (10, 6).")
-    ] = None,
-    window: Annotated[
-        Window | None,
-        typer.Option(
-            metavar=names(Window),
-            help="What a lifted state is fitted to: the whole trajectory from Γ, as in the paper, or the horizon ahead "
-            f"of each sample ({FitEigen.window}).",
-        ),
-    ] = None,
-    boundary: Annotated[
-        Boundary | None,
-        typer.Option(
-            metavar=names(Boundary),
-            help="window trajectory: values of the eigenfunctions at the initial states, thin-plate splines of the "
-            f"state, as in the paper, or the best ones for each trajectory ({FitEigen.boundary}).",
-        ),
-    ] = None,
-    centres: Annotated[int | None, typer.Option(help=f"thin-plate: number of splines ({FitEigen.centres}).")] = None,
-    cut: Annotated[
-        float | None,
-        typer.Option(
-            help="Smallest singular value kept, relative to the largest; the errors depend on it (1e-14 for "
-            "thin-plate, working precision for optimal)."
-        ),
-    ] = None,
-    lift: Annotated[
-        LiftName | None,
-        typer.Option(
-            metavar=names(LiftName),
-            help="How a state is looked up: the nearest sample, linear between samples (Delaunay), moving least "
-            f"squares, or local polyharmonic splines ({FitEigen.lift}).",
-        ),
-    ] = None,
-    coordinates: Annotated[
-        Coordinates | None,
-        typer.Option(
-            metavar=names(Coordinates),
-            help="window horizon: interpolate states, or the motion as seen from outside, turned back by the predicted "
-            f"yaw ({FitEigen.coordinates}).",
-        ),
-    ] = None,
-    tabulate: Annotated[
-        float | None,
-        typer.Option(
-            help="Seconds of each trajectory in which a state is looked up; what is simulated beyond is the longest "
-            f"prediction ({FitEigen.tabulate:g})."
-        ),
-    ] = None,
-    mirror: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar=names(Mirror),
-            autocompletion=lambda: list(get_args(Mirror)),
-            help="Mirror images of the trajectories are data too: of a car that is the same to the left and to the "
-            "right, or at both axles. The option may be given twice.",
-        ),
-    ] = None,
-    trust: Annotated[
-        bool | None,
-        typer.Option(
-            "--trust", help="window horizon: estimate errors from data held back, for a bound at every state."
-        ),
-    ] = None,
+    *,
+    given: Values,
     vehicle: VehicleOption = None,
     set_: SetOption = None,
     experiment: ExperimentOption = "paper",
@@ -234,25 +99,11 @@ def fit_eigen(
 
     Example: koop fit-eigen --experiment best-eigen --vehicle bmw-320i
     """
-    fit: Values = {
-        "eigenvalues": eigenvalues,
-        "degree": degree,
-        "pairs": pairs,
-        "window": window,
-        "boundary": boundary,
-        "centres": centres,
-        "cut": cut,
-        "lift": lift,
-        "coordinates": coordinates,
-        "tabulate": tabulate,
-        "mirror": mirror or None,
-        "trust": trust,
-    }
-    call = begin(store, experiment, set_, (*DATA, "fit-eigen"), {"fit-eigen": fit, "vehicle": {"name": vehicle}})
+    call = begin(store, experiment, set_, (*DATA, "fit-eigen"), {"fit-eigen": given, "vehicle": {"name": vehicle}})
     from koopcli.stages import recipes
 
     of = call.optional(trajectories, ["simulate"], "the TRAJECTORIES", ("fit-eigen",))
-    call.run(recipes.fit_eigen(call.experiment, of), as_json=as_json, dry_run=dry_run)
+    call.run(lambda experiment: recipes.fit_eigen(experiment, of), as_json=as_json, dry_run=dry_run)
 
 
 def baseline(
@@ -284,11 +135,11 @@ def baseline(
     from koopcli.stages import recipes
 
     of = call.optional(trajectories, ["simulate"], "the TRAJECTORIES", ("baseline",))
-    call.run(recipes.baseline(call.experiment, of), as_json=as_json, dry_run=dry_run)
+    call.run(lambda experiment: recipes.baseline(experiment, of), as_json=as_json, dry_run=dry_run)
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands of this file."""
-    app.command("fit-edmd", rich_help_panel="Make")(fit_edmd)
-    app.command("fit-eigen", rich_help_panel="Make")(fit_eigen)
-    app.command("baseline", rich_help_panel="Make")(baseline)
+    app.command("fit-edmd")(fit_edmd)
+    app.command("fit-eigen")(fit_eigen)
+    app.command("baseline")(baseline)

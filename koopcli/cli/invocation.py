@@ -6,11 +6,12 @@ import csv
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
+from koopcli.checks import written
 from koopcli.config.changes import Changes, flat, parse_set
 from koopcli.config.experiment import Experiment, load_experiment
 from koopcli.console import Console, show_table
@@ -20,7 +21,11 @@ from koopcli.text import printable
 if TYPE_CHECKING:
     from koopcli.config.settings import Simulate
     from koopcli.stages.base import Task
+    from koopcli.stages.effects import Plan
     from koopcli.stages.pipeline import Artefact, Pipeline, Step
+
+
+DATA = ("sample", "vehicle", "simulate")  # the sections behind trajectories
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,14 @@ class Invocation:
         content = self.pipeline.make(predictor).content
         return remembered_simulation(content.plant, content.dt)
 
+    def refuse_idle(self, plan: Plan, tasks: Sequence[Task]) -> None:
+        """Raise ``UsageError`` for a change that has no effect on the ``tasks`` that ``plan`` makes."""
+        from koopcli.stages.effects import why_idle
+
+        for name, _ in flat(self.changes):
+            if idle := why_idle(name, self.experiment, plan, tasks):
+                raise UsageError(f"{name} changes nothing here: {idle}")
+
     def say_what_vehicle(self, tasks: Sequence[Task]) -> None:
         """Note where the vehicle that was named makes the same as another would."""
         from koopcli.stages.vehicle import makes_the_same
@@ -72,25 +85,21 @@ class Invocation:
 
     def run(
         self,
-        task: Task,
+        make: Callable[[Experiment], Task],
         *,
         as_json: bool,
         dry_run: bool,
         extra: Callable[[Artefact], Mapping[str, Any] | None] | None = None,
-        reads: Sequence[str] = (),
         also: Sequence[Task] = (),
         table_out: bool = False,
     ) -> None:
-        """Make ``task`` and print its name, or print the plan.
+        """Make the task that ``make`` plans of the experiment and print its name, or print the plan.
 
-        ``extra`` does the rest with the artefact and may return more for its JSON, ``also``: what it makes; ``reads``:
-        settings that matter beside those of the stages; ``table_out``: whether stdout has the table of the artefact.
+        ``extra`` does the rest with the artefact and may return more for its JSON, ``also``: what it makes;
+        ``table_out``: whether stdout has the table of the artefact.
         """
-        from koopcli.stages.effects import why_idle
-
-        for name, _ in flat(self.changes):
-            if idle := why_idle(name, self.experiment, [task], reads):
-                raise UsageError(f"{name} changes nothing here: {idle}")
+        task = make(self.experiment)
+        self.refuse_idle(lambda experiment: [make(experiment)], [task])
         self.say_what_vehicle([task])
         if dry_run:
             steps = {step.task: step for one in (task, *also) for step in self.pipeline.plan(one)}
@@ -185,7 +194,7 @@ def show_plan(steps: Sequence[Step], *, as_json: bool) -> None:
     seconds, size = sum(step.cost.seconds for step in steps), sum(step.cost.bytes for step in steps)
     if as_json:
         rows = [
-            {"name": step.name, "action": step.state, **vars(step.cost), "settings": asdict(step.task.settings)}
+            {"name": step.name, "action": step.state, **vars(step.cost), "settings": written(step.task.settings)}
             for step in steps
         ]
         print_json({"dry_run": True, "steps": rows, "seconds": round(seconds, 2), "bytes": round(size)})
@@ -194,7 +203,7 @@ def show_plan(steps: Sequence[Step], *, as_json: bool) -> None:
     for step in steps:
         made = step.state == "make"
         cost = (f"{step.cost.seconds:.1f}", size_text(step.cost.bytes)) if made else ("", "")
-        table.append([step.name, step.state, brief(asdict(step.task.settings)), *cost])
+        table.append([step.name, step.state, brief(written(step.task.settings)), *cost])
     table.append(["total, roughly", "", "", f"{seconds:.1f}", size_text(size)])
     show_table(["artefact", "action", "settings", "seconds", "size"], table, left=3)
 

@@ -123,4 +123,4 @@ def gc(
 def register(app: typer.Typer) -> None:
     """Add the commands of this file."""
     for command in (verify, gc):
-        app.command(command.__name__, rich_help_panel="Look into the store and after it")(command)
+        app.command(command.__name__)(command)

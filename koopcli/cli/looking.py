@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from koopcli.checks import written
 from koopcli.cli.completion import complete_name, complete_stage
 from koopcli.cli.invocation import brief, open_store, print_json, write_csv
 from koopcli.cli.lineage import show_lineage
@@ -243,7 +243,7 @@ def _obtain(name: str, store: Path | None) -> tuple[Artefact, Task, Path]:
 
 def _settings(task: Task, role: str) -> Iterator[tuple[str, Any]]:
     """The settings of a task and of all behind it, each under the roles that lead to it and its stage."""
-    yield f"{role} ({task.stage})" if role else task.stage, asdict(task.settings)
+    yield f"{role} ({task.stage})" if role else task.stage, written(task.settings)
     for name, upstream in task.inputs:
         yield from _settings(upstream, f"{role} / {name}".removeprefix(" / "))
 
@@ -277,4 +277,4 @@ def _rows(value: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
 def register(app: typer.Typer) -> None:
     """Add the commands of this file."""
     for command in (ls, show, path, pin, unpin):
-        app.command(command.__name__, rich_help_panel="Look into the store and after it")(command)
+        app.command(command.__name__)(command)

@@ -117,4 +117,4 @@ def _takes(kind: FigureKind) -> str:
 
 def register(app: typer.Typer) -> None:
     """Add the command of this file."""
-    app.command("plot", rich_help_panel="Make")(plot)
+    app.command("plot")(plot)

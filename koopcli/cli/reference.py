@@ -3,29 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING
 from textwrap import fill
-from types import UnionType
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin
 
-from koopcli.cli.app import root
-from koopcli.config.pictures import PlotOptions
-from koopcli.config.samples import SAMPLES
-from koopcli.config.settings import About, Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
-from koopcli.vehicles.parameters import VehicleParameters
-
-DECLARED: tuple[tuple[str, Any], ...] = (
-    ("experiment", About),
-    ("vehicle", VehicleParameters),
-    *((f"sample.{kind}", cls) for kind, cls in SAMPLES.items()),
-    ("simulate", Simulate),
-    ("fit-edmd", FitEdmd),
-    ("fit-eigen", FitEigen),
-    ("baseline", Baseline),
-    ("evaluate", Evaluate),
-    ("plot", PlotOptions),
-    ("reproduce", Reproduce),
-)
+from koopcli.checks import Choice, without_none
+from koopcli.cli.app import whole
+from koopcli.cli.derived import ordered
+from koopcli.config.declared import every_setting
 
 WIDTH = 116  # letters of a line
 HEAD = """# Command reference
@@ -37,7 +22,7 @@ everything else on stderr; with `--json` it prints one JSON object.
 
 def reference() -> str:
     """The whole page as Markdown."""
-    commands = [line for name, command in root().commands.items() for line in _command(name, command)]
+    commands = [line for name, command in whole().items() for line in _command(name, command)]
     return "\n".join([HEAD, *commands, *_settings(), ""])
 
 
@@ -46,25 +31,26 @@ def _settings() -> Iterator[str]:
     yield "## Settings\n"
     yield "For `--set SECTION.KEY=VALUE` and for experiment files. Values are TOML; `--set` also takes numbers such as"
     yield ".5, as options do, and one name for a list of names. `vehicle.name` chooses a vehicle.\n"
-    yield "`test.box`, `test.point`, `test.ball`, `test.drive-test` and `test.manoeuvre` take what samples of those"
-    yield "kinds take; a setting without its kind, such as `sample.seed`, holds for the kind in use.\n"
+    yield "A setting of a kind, such as `fit-edmd.basis.thin-plate.centres`, holds for it, whether it is in effect or not."
+    yield "Without the kind, as `fit-edmd.centres` or `sample.seed`, it is a setting of the kind in effect.\n"
     yield "| setting | default | allowed | meaning |\n|---|---|---|---|"
-    for section, cls in DECLARED:
-        hints = get_type_hints(cls)
-        for f in fields(cls):
-            if f.metadata:
-                default = "" if f.default is MISSING or f.default is None else _plain(f.default)
-                allowed = _allowed(hints[f.name], f.metadata)
-                yield f"| {section}.{f.name} | {default} | {allowed} | {f.metadata['help']} |"
+    for declared in every_setting():
+        f = declared.field
+        default = "" if f.default is MISSING or f.default is None else _plain(f.default)
+        allowed = _allowed(declared.hint, f.metadata, f.default)
+        yield f"| {declared.full_name} | {default} | {allowed} | {f.metadata['help']} |"
 
 
 def _plain(value: Any) -> str:
+    if isinstance(value, Choice):
+        return value.kind
     return f"[{', '.join(map(str, value))}]" if isinstance(value, tuple) else str(value)
 
 
-def _allowed(kind: Any, bounds: Mapping[str, Any]) -> str:
-    if get_origin(kind) in (Union, UnionType):
-        (kind,) = [one for one in get_args(kind) if one is not type(None)]
+def _allowed(hint: Any, bounds: Mapping[str, Any], default: object = None) -> str:
+    kind = without_none(hint)
+    if isinstance(kind, type) and issubclass(kind, Choice):
+        return ", ".join(ordered(kind, default))
     if get_origin(kind) is tuple:
         return f"list: {_allowed(get_args(kind)[0], bounds)}"
     if get_origin(kind) is Literal:

@@ -274,4 +274,4 @@ def _figure_json(method: Method, one: Illustration) -> dict[str, Any]:
 
 def register(app: typer.Typer) -> None:
     """Add the command of this file."""
-    app.command("reproduce", rich_help_panel="Reproduce")(reproduce)
+    app.command("reproduce")(reproduce)

@@ -285,4 +285,4 @@ def _drawn(call: Invocation, artefact: Artefact, image: ImageFormat) -> bytes:
 
 def register(app: typer.Typer) -> None:
     """Add the command of this file."""
-    app.command("sweep", rich_help_panel="Make")(sweep)
+    app.command("sweep")(sweep)

@@ -134,4 +134,4 @@ def _shipped() -> list[Path]:
 
 def register(app: typer.Typer) -> None:
     """Add the commands of this file."""
-    app.add_typer(vehicle, name="vehicle", rich_help_panel="Look into the store and after it")
+    app.add_typer(vehicle, name="vehicle")

@@ -3,41 +3,61 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from koopcli.checks import COMMAND_LINE, Origin, build, candidates, from_file
-from koopcli.config.changes import SECTIONS, Changes, Values
+from koopcli.checks import (
+    COMMAND_LINE,
+    Layer,
+    Origin,
+    build_layers,
+    candidates,
+    check_choice,
+    choose,
+    chosen_kind,
+    from_file,
+    names_of,
+    taken,
+    written,
+)
+from koopcli.config.changes import SECTIONS, Changes, flat, nested
 from koopcli.config.data import locate
+from koopcli.config.declared import DECLARED, KINDS
 from koopcli.config.pictures import PlotOptions
-from koopcli.config.samples import ELSEWHERE, OF_SIMULATION, OF_VEHICLE, SAMPLED_FOR, SAMPLES, SampleSettings
-from koopcli.config.settings import About, Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
-from koopcli.errors import InvalidValueError, KoopError, UsageError
+from koopcli.config.settings import About, Baseline, Evaluate, Reproduce, Simulate
+from koopcli.errors import InvalidValueError, KoopError
+from koopcli.koopman.edmd.fit import FitEdmd
+from koopcli.koopman.eigen.fit import FitEigen
 from koopcli.parsing import parse_toml
+from koopcli.simulation.samples.sample import SampleChoice
 from koopcli.text import read_text
 from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
+from koopcli.vehicles.plants.plant import PlantChoice
 
-KINDS = {"sample": tuple(SAMPLES), "test": ("box", "point", "ball", "drive-test", "manoeuvre")}
 DEFAULT_VEHICLE = "ctu-2020"
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Layer:
-    """Raw values, where they came from, and the folder of relative paths in them."""
+class Source:
+    """Raw values by section, where they came from, and the folder of relative paths in them."""
 
     values: Mapping[str, Mapping[str, Any]]
     origin: Origin
     folder: Path
+
+    def section(self, name: str) -> Layer:
+        """The values of a section."""
+        return Layer(self.values.get(name, {}), self.origin)
 
 
 @dataclass(frozen=True)
 class Experiment:
     """Settings of every stage; :meth:`sample` and :meth:`test` give those that depend on a kind and on the vehicle."""
 
-    layers: tuple[Layer, ...]
+    sources: tuple[Source, ...]
     about: About
     simulate: Simulate
     fit_edmd: FitEdmd
@@ -55,22 +75,22 @@ class Experiment:
     @property
     def vehicle_name(self) -> str:
         """What the vehicle is called: for tables only, a recipe holds its values."""
-        named = [layer.values.get("vehicle", {}).get("name") for layer in self.layers]
+        named = [source.values.get("vehicle", {}).get("name") for source in self.sources]
         return Path(str(next((name for name in reversed(named) if name), DEFAULT_VEHICLE))).stem
 
     def before_naming(self) -> Experiment | None:
         """The experiment without the last name of a vehicle; None where there is none, or what is changed of the
         vehicle needs it.
         """
-        named = [i for i, layer in enumerate(self.layers) if "name" in layer.values.get("vehicle", {})]
+        named = [i for i, layer in enumerate(self.sources) if "name" in layer.values.get("vehicle", {})]
         if not named:
             return None
-        layers = list(self.layers)
+        layers = list(self.sources)
         last = layers[named[-1]]
         changed = {key: value for key, value in last.values["vehicle"].items() if key != "name"}
         layers[named[-1]] = replace(last, values={**last.values, "vehicle": changed})
         try:
-            return replace(self, layers=tuple(layers))._driving(_vehicle(layers))
+            return replace(self, sources=tuple(layers))._driving(_vehicle(layers))
         except KoopError:
             return None
 
@@ -79,9 +99,9 @@ class Experiment:
 
         Parameters that an experiment file changes make its own vehicle and no other.
         """
-        named = [layer for layer in self.layers if "beside" in layer.values.get("reproduce", {})]
+        named = [layer for layer in self.sources if "beside" in layer.values.get("reproduce", {})]
         folder = named[-1].folder if named else Path()
-        changed = {key: v for key, v in self.layers[-1].values.get("vehicle", {}).items() if key != "name"}
+        changed = {key: v for key, v in self.sources[-1].values.get("vehicle", {}).items() if key != "name"}
         return self._driving(change(vehicle_named(name, folder), changed, COMMAND_LINE))
 
     def with_parameters(self, **changed: object) -> Experiment:
@@ -91,81 +111,102 @@ class Experiment:
     def _driving(self, vehicle: VehicleParameters) -> Experiment:
         return replace(self, simulate=replace(self.simulate, vehicle=vehicle))
 
-    def sample(self, kind: str) -> SampleSettings:
-        """The training sample, of ``kind`` unless the experiment names one."""
-        return self._sampled("sample", kind, self.vehicle)
+    def sample(self, usual: str) -> SampleChoice:
+        """The training sample, of the ``usual`` kind unless the experiment names one."""
+        return self._sampled("sample", usual, self.vehicle)
 
-    def test(self, kind: str, vehicle: VehicleParameters) -> SampleSettings:
-        """The test sample of a ``vehicle``, of ``kind`` unless the experiment names one."""
-        return self._sampled("test", kind, vehicle)
+    def test(self, usual: str, vehicle: VehicleParameters) -> SampleChoice:
+        """The test sample of a ``vehicle``, of the ``usual`` kind unless the experiment names one."""
+        return self._sampled("test", usual, vehicle)
 
-    def tabled(self, kind: str) -> SampleSettings:
-        """The test sample of a ``kind`` without a vehicle, from its tables alone, whichever kind is in effect."""
-        return self._built("test", kind, {}, self.vehicle)
+    def tabled(self, kind: str, section: str = "test") -> SampleChoice:
+        """The sample of a ``kind``, from its tables alone, whichever kind is in effect."""
+        return self._sampled(section, kind, self.vehicle, tables=True)
 
-    def _sampled(self, section: str, kind: str, vehicle: VehicleParameters) -> SampleSettings:
-        """What applies to the kind in effect: tables of that kind, and settings written outside any table.
+    def _sampled(self, section: str, usual: str, vehicle: VehicleParameters, *, tables: bool = False) -> SampleChoice:
+        layers = [source.section(section) for source in self.sources]
+        if tables:
+            layers = [one.only(lambda key, value: isinstance(value, Mapping)) for one in layers]
+        kinds = KINDS[section]
+        kind = kinds[chosen_kind(kinds, layers, usual)]
+        plant = self.plant_for(kind.meant_for)
+        known = {**vars(vehicle), **written(plant), "vehicle": plant.used(vehicle), "dt": self.simulate.dt}
+        beside = {name: known[name] for name in taken(kind)}
+        sample: SampleChoice = choose(kinds, layers, usual, f"{section}.", section, beside)
+        return sample
 
-        The latter hold for the kind that was in effect in their layer; a layer that changes the kind starts afresh.
-        """
-        before = kind
-        loose: dict[int, Values] = {}
-        for i, layer in enumerate(self.layers):
-            given = layer.values.get(section, {})
-            now = given.get("kind", before)
-            if now != before:
-                loose = {}
-            before = now
-            loose[i] = {key: v for key, v in given.items() if key != "kind" and not isinstance(v, Mapping)}
-            _check_owner(section, now, loose[i], layer.origin)
-        return self._built(section, before, loose, vehicle)
+    def plant_for(self, kind: type[PlantChoice]) -> PlantChoice:
+        """The plant of a ``kind``, whichever is in effect, with what the experiment says of it."""
+        if isinstance(self.simulate.plant, kind):
+            return self.simulate.plant
+        names = {"plant", *names_of(kind)}
+        layers = [source.section("simulate").only(lambda key, value: key in names) for source in self.sources]
+        plant = build_layers(Simulate, [*layers, Layer({"plant": kind.kind})], beside={"vehicle": self.vehicle}).plant
+        assert plant is not None, "chosen"
+        return plant
 
-    def _built(
-        self, section: str, kind: str, loose: Mapping[int, Values], vehicle: VehicleParameters
-    ) -> SampleSettings:
-        """The sample of ``kind`` from its tables, and from what stands ``loose`` outside of them, by layer."""
-        layers, known = [], {f.name for f in fields(SAMPLES[kind])}
-        for i, layer in enumerate(self.layers):
-            there = layer.values.get(section, {}).get(kind)
-            table = there if isinstance(there, Mapping) else {}  # grid and box samples have a setting "box" too
-            layers.append(Layer({section: {**table, **loose.get(i, {})}}, layer.origin, layer.folder))
-        taken: Values = {name: getattr(vehicle, name) for name in OF_VEHICLE if name in known}
-        if "vehicle" in known:
-            simulate = replace(self.simulate, vehicle=vehicle, plant=SAMPLED_FOR[kind]).settled()
-            taken = {name: getattr(simulate, name) for name in OF_SIMULATION if name in known}
-        if taken:
-            layers = [Layer({section: taken}, COMMAND_LINE, Path()), *layers]
-        return _section(SAMPLES[kind], section, layers).settled()
+    def fit(self, section: str, **chosen: str) -> Any:
+        """The settings of a fit with other kinds ``chosen``, which have what the experiment says of them in tables."""
+        layers = [source.section(section) for source in self.sources]
+        return build_layers(DECLARED[section], [*layers, Layer(chosen)], f"{section}.")
+
+    def value(self, name: str, sample: str = "") -> object:
+        """The value of a setting by its full ``name``, of samples without a table that of the kind ``sample``."""
+        section, *keys = name.split(".")
+        if section == "vehicle":
+            value: Any = self.vehicle
+            for key in keys:
+                value = getattr(value, key, None)
+            return value
+        kinds = dict(zip(keys[:-1:2], keys[1:-1:2], strict=True))
+        if section in KINDS:
+            own = self.tabled(keys[0], section) if len(keys) > 1 else self._sampled(section, sample, self.vehicle)
+            return written(own).get(keys[-1])
+        if section == "simulate" and self.simulate.plant is None:
+            return [written(self.plant_for(kind)).get(keys[-1]) for kind in PlantChoice.kinds().values()]
+        beside = {name: getattr(self, name) for name in taken(DECLARED[section])}
+        layers = [*(source.section(section) for source in self.sources), Layer(kinds)]
+        return written(build_layers(DECLARED[section], layers, beside=beside)).get(
+            keys[-2] if keys[-1] == "kind" else keys[-1]
+        )
+
+    def without(self, name: str) -> Experiment:
+        """The experiment without a change of the command line."""
+        changes = nested((other, value) for other, value in flat(self.sources[-1].values) if other != name)
+        return _experiment((*self.sources[:-1], replace(self.sources[-1], values=changes)))
 
 
 def load_experiment(name: str, changes: Changes) -> Experiment:
     """The experiment ``name`` (shipped, or a file by its path) with ``changes`` of the command line laid over it."""
     path = locate("experiments", name, "experiment")
     here = from_file(path)
-    layers = (Layer(_read(path, here), here, path.parent), Layer(changes, COMMAND_LINE, Path()))
-    for layer in layers:
-        for section in layer.values:
+    return _experiment((Source(_read(path, here), here, path.parent), Source(changes, COMMAND_LINE, Path())))
+
+
+def _experiment(sources: tuple[Source, ...]) -> Experiment:
+    """The experiment of ``sources``, of which later ones win."""
+    for source in sources:
+        for section in source.values:
             if section not in SECTIONS:
-                raise layer.origin.misnamed(
-                    layer.origin.say(f"unknown section '{section}'{candidates(section, SECTIONS)}")
+                raise source.origin.misnamed(
+                    source.origin.say(f"unknown section '{section}'{candidates(section, SECTIONS)}")
                 )
-        if "vehicle" in layer.values.get("simulate", {}):
-            raise layer.origin.misnamed(
-                layer.origin.say("the vehicle has a section of its own: vehicle.name, vehicle.Jzz")
-            )
-        for section in KINDS:
-            _check_sampled(section, layer)
-    vehicle = Layer({"simulate": {"vehicle": _vehicle(layers)}}, COMMAND_LINE, Path())
+    for section, kinds in KINDS.items():
+        check_choice(kinds, [source.section(section) for source in sources], None, f"{section}.", section)
+
+    def settings(cls: type[T], section: str, **beside: object) -> T:
+        return build_layers(cls, [source.section(section) for source in sources], f"{section}.", beside)
+
     return Experiment(
-        layers=layers,
-        about=_section(About, "experiment", layers),
-        simulate=_section(Simulate, "simulate", [vehicle, *layers]),
-        fit_edmd=_section(FitEdmd, "fit-edmd", layers),
-        fit_eigen=_section(FitEigen, "fit-eigen", layers),
-        baseline=_section(Baseline, "baseline", layers),
-        evaluate=_section(Evaluate, "evaluate", layers),
-        plot=_section(PlotOptions, "plot", layers),
-        reproduce=_section(Reproduce, "reproduce", layers),
+        sources=sources,
+        about=settings(About, "experiment"),
+        simulate=settings(Simulate, "simulate", vehicle=_vehicle(sources)),
+        fit_edmd=settings(FitEdmd, "fit-edmd"),
+        fit_eigen=settings(FitEigen, "fit-eigen"),
+        baseline=settings(Baseline, "baseline"),
+        evaluate=settings(Evaluate, "evaluate"),
+        plot=settings(PlotOptions, "plot"),
+        reproduce=settings(Reproduce, "reproduce"),
     )
 
 
@@ -185,80 +226,7 @@ def _read(path: Path, here: Origin) -> Changes:
     return content
 
 
-def _section(cls: type[T], section: str, layers: Sequence[Layer]) -> T:
-    """The settings ``cls``; each layer is checked by itself, so that an error names where the value came from."""
-    settled: Values = {}
-    for layer in layers:
-        given = layer.values.get(section, {})
-        parsed = build(cls, {**settled, **given}, layer.origin, f"{section}.")
-        settled |= {key: getattr(parsed, key) for key in given}
-    return build(cls, settled, COMMAND_LINE, f"{section}.")
-
-
-def _check_sampled(section: str, layer: Layer) -> None:
-    """Refuse what no kind of sample would take, whichever will be in effect."""
-    where = layer.origin
-    for key, value in layer.values.get(section, {}).items():
-        misnamed = value if key == "kind" else key if isinstance(value, Mapping) else None
-        if misnamed is not None and misnamed not in KINDS[section]:
-            raise where.misnamed(
-                where.say(f"unknown kind of {section} {misnamed!r}{candidates(str(misnamed), KINDS[section])}")
-            )
-        if isinstance(value, Mapping):
-            for name, owner in ELSEWHERE.items():
-                if name in value and name in {f.name for f in fields(SAMPLES[key])}:
-                    raise where.misnamed(where.say(_elsewhere(f"{section}.{key}.{name}", name, owner)))
-            _check_owner(f"{section}.{key}", key, value, where)
-            _try_out(key, value, where, f"{section}.{key}.")
-        elif key != "kind":
-            _check_loose(section, key, value, where)
-
-
-def _check_loose(section: str, key: str, value: object, origin: Origin) -> None:
-    """Refuse a setting outside any table that none of the kinds takes."""
-    known = {kind: {f.name for f in fields(SAMPLES[kind])} - {"kind", *ELSEWHERE} for kind in KINDS[section]}
-    if key in ELSEWHERE:
-        raise origin.misnamed(origin.say(_elsewhere(f"{section}.{key}", key, ELSEWHERE[key])))
-    owners = [kind for kind in known if key in known[kind]]
-    if not owners:
-        every = sorted(set().union(*known.values()))
-        raise origin.misnamed(origin.say(f"unknown setting '{section}.{key}'{candidates(key, every)}"))
-    refused: list[KoopError] = []
-    for kind in owners:
-        try:
-            _try_out(kind, {key: value}, origin, f"{section}.")
-        except (UsageError, InvalidValueError) as error:
-            refused.append(error)
-    if len(refused) == len(owners):
-        raise refused[0]
-
-
-def _elsewhere(name: str, key: str, owner: str) -> str:
-    """What is said of a setting that a sample takes from another section."""
-    remedy = "choose it by vehicle.name" if key == owner else f"set {owner}.{key}"
-    return f"'{name}' is {'the vehicle' if owner == 'vehicle' else 'the simulation'}'s: {remedy}"
-
-
-def _try_out(kind: str, values: Mapping[str, Any], origin: Origin, prefix: str) -> None:
-    """Build a sample of ``kind``, a stand-in for the vehicle that is not known yet."""
-    stand_in: Values = {f.name: 1.0 for f in fields(SAMPLES[kind]) if f.name in ELSEWHERE}
-    if "vehicle" in stand_in:
-        stand_in |= {"vehicle": VehicleParameters(m=1.0, Jzz=1.0, l_f=1.0, l_r=1.0, c_w=0.0, A=0.0, rho=0.0)}
-    build(SAMPLES[kind], {**stand_in, **values}, origin, prefix)
-
-
-def _check_owner(section: str, kind: str, given: Mapping[str, Any], origin: Origin) -> None:
-    """Refuse settings that a sample of ``kind`` does not have, saying whose they are."""
-    for key in given:
-        owners = [name for name, cls in SAMPLES.items() if key in {f.name for f in fields(cls)}]
-        if owners and kind not in owners:
-            whose, what = " or ".join(f"'{owner}'" for owner in owners), section.partition(".")[0]
-            raise origin.misnamed(
-                origin.say(f"'{section}.{key}' belongs to kind {whose}, this {what} is of kind '{kind}'")
-            )
-
-
-def _vehicle(layers: Sequence[Layer]) -> VehicleParameters:
+def _vehicle(layers: Sequence[Source]) -> VehicleParameters:
     """The vehicle named last, with the single parameters that its own or a later layer changes."""
     vehicle = vehicle_named(DEFAULT_VEHICLE)
     for layer in layers:

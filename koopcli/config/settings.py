@@ -11,27 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from koopcli.checks import setting
-from koopcli.config.plants import UNUSED, PlantName, used_of
-from koopcli.config.sampled import LARGEST, SEED_LIMIT, Draw, Excitation, Mirror
-from koopcli.vehicles.options import CUSTOMARY
+from koopcli.checks import SEED_LIMIT, setting, taken_from
+from koopcli.simulation.samples.sample import LARGEST, Excitation
 from koopcli.vehicles.parameters import VehicleParameters
+from koopcli.vehicles.plants.plant import PlantChoice
 
-ForcePer = Literal["axle", "wheel"]
-Combined = Literal["none", "ellipse"]
-BasisName = Literal["tensor", "total", "anisotropic", "thin-plate", "states"]
-Terms = Literal["linear", "bilinear", "generator"]
-Placement = Literal["k-means", "drawn"]
-Solver = Literal["orthonormal", "cholesky-monomials"]
-Boundary = Literal["thin-plate", "optimal"]
-Eigenvalues = Literal["dmd", "comb", "varpro"]
-Window = Literal["trajectory", "horizon"]
-LiftName = Literal["nearest", "linear", "mls", "polyharmonic"]
-Coordinates = Literal["state", "world"]
-Scaling = Literal["raw", "extent"]
 BaselineKind = Literal["hold", "rotation", "linearisation"]
 FitName = Literal["fit-edmd", "fit-eigen"]
-CHUNKS = {"forces": 500_000, "slips": 200_000, "wheels": 200_000}  # samples; fewer at a time take longer each
 
 
 @dataclass(frozen=True)
@@ -43,29 +29,21 @@ class About:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Simulate:
     """A plant with its vehicle, integrated from a sample."""
 
-    vehicle: VehicleParameters
-    plant: PlantName | None = setting(None, help="equations of motion; else those the sample is for")
-    force_per: ForcePer = setting("axle", help="forces: what one input force acts on")
-    v_eps: float | None = setting(
-        None,
-        above=0,
-        high=100,
-        unit="m/s",
-        help="a wheel slower than this counts as that fast in its slips; else 0.1 (slips) or 0.5 (wheels)",
+    vehicle: VehicleParameters = taken_from("vehicle")
+    plant: PlantChoice | None = setting(None, option=True, help="equations of motion; else those the sample is for")
+    steps: int | None = setting(
+        None, low=1, high=1_000_000, option=True, help="steps of each trajectory; else as the sample has"
     )
-    combined: Combined | None = setting(
-        None, help="how forces along and across a wheel share its grip; else none (slips) or ellipse (wheels)"
+    dt: float = setting(0.01, above=0, high=10, unit="s", option=True, help="sampling period")
+    reference: bool = setting(
+        False,
+        option=True,
+        help="integrate by a solver that controls its error, slowly, and say how far the usual integration is off",
     )
-    brake_width: float | None = setting(
-        None, above=0, high=1e3, unit="rad/s", help="wheels: wheel rate over which brake torques turn; else 1"
-    )
-    dt: float = setting(0.01, above=0, high=10, unit="s", help="sampling period")
-    steps: int | None = setting(None, low=1, high=1_000_000, help="steps of each trajectory; else as the sample has")
-    reference: bool = setting(False, help="integrate by a solver that controls its error, to compare with")
     chunk: int | None = setting(
         None,
         low=1,
@@ -73,133 +51,10 @@ class Simulate:
         help="samples for each committed part, a hundredth of them for the reference; else 500000 (forces) or 200000",
     )
 
-    def settled(self) -> Simulate:
-        """The same simulation: what is left open is written out as its plant has it, what has no effect is reset."""
-        plant = self.plant or "forces"
-        own = {name.partition(".")[2] for name in UNUSED[plant] if name.startswith("simulate.")}
-        idle = {name: getattr(Simulate, name) for name in own}
-        open_ = {name: value for name, value in CUSTOMARY[plant].items() if getattr(self, name) is None}
-        chunk = CHUNKS[plant] if self.chunk is None else self.chunk
-        return replace(self, vehicle=used_of(self.vehicle, plant), chunk=chunk, **{**idle, **open_})
-
-
-@dataclass(frozen=True)
-class FitEdmd:
-    """EDMD with inputs."""
-
-    order: int = setting(
-        7, low=1, high=1000, help="highest degree: of each state, of a product (total), of the yaw rate (anisotropic)"
-    )
-    basis: BasisName = setting("tensor", help="family of observables; states alone is dynamic mode decomposition")
-    degree_velocity: int = setting(1, low=0, high=1000, help="anisotropic: highest degree of v_x and v_y together")
-    centres: int = setting(500, low=1, high=100_000, help="thin-plate: number of splines")
-    placement: Placement = setting(
-        "k-means", help="thin-plate: centres are means of clusters of the data, or drawn from a normal distribution"
-    )
-    seed: int = setting(0, low=0, high=SEED_LIMIT, help="thin-plate: seed of the centres")
-    terms: Terms = setting("linear", help="how inputs act: B u; with u_i N_i z; or so in continuous time")
-    ridge: float = setting(0.0, low=0, high=1e6, help="penalty on the coefficients, of the scaled columns' size")
-    solver: Solver = setting(
-        "orthonormal", help="least squares; cholesky-monomials shows where the textbook's normal equations end"
-    )
-
-    chunk: int = setting(
-        1_000_000, low=1, high=10**9, help="samples for each committed part of sums; a product dataset has none"
-    )
-
-    def settled(self) -> FitEdmd:
-        """The same fit: what its basis does not use is reset."""
-        idle = {name for names in OF_BASIS.values() for name in names} - set(OF_BASIS[self.basis])
-        return replace(self, **{name: getattr(FitEdmd, name) for name in idle})
-
-
-OF_BASIS: dict[str, tuple[str, ...]] = {
-    "tensor": ("order",),
-    "total": ("order",),
-    "anisotropic": ("order", "degree_velocity"),
-    "thin-plate": ("centres", "placement", "seed"),
-    "states": (),
-}
-
-
-@dataclass(frozen=True)
-class FitEigen:
-    """Eigenfunctions from trajectories."""
-
-    eigenvalues: Eigenvalues = setting(
-        "dmd", help="rates: sums of the data's own, a comb of frequencies, or those that a search finds from there"
-    )
-    degree: int = setting(2, low=0, high=100, help="dmd: most rates of the dynamic mode decomposition in one sum")
-    pairs: int | None = setting(
-        None, low=1, high=1000, help="comb, varpro: pairs of complex rates beside two real ones; else 10 and 6"
-    )
-    lowest: float = setting(2.0, above=0, high=1e6, unit="rad/s", help="comb, varpro: lowest frequency")
-    highest: float = setting(26.0, above=0, high=1e6, unit="rad/s", help="comb, varpro: highest frequency")
-    damping: float = setting(1.0, low=0, high=1e6, unit="1/s", help="comb, varpro: decay of all but the constant")
-    window: Window = setting(
-        "trajectory", help="what a lifted state is fitted to: the trajectory from Γ, or the horizon ahead of a sample"
-    )
-    boundary: Boundary = setting("thin-plate", help="values on Γ: thin-plate splines of x0, or the best ones")
-    centres: int = setting(441, low=1, high=100_000, help="thin-plate: number of splines")
-    seed: int = setting(0, low=0, high=SEED_LIMIT, help="thin-plate: seed of their centres")
-    scaling: Scaling = setting("raw", help="thin-plate: distances in raw SI units, or in half-widths of the data")
-    cut: float | None = setting(
-        None, low=0, high=0.5, help="smallest singular value kept, of the largest; else 1e-14 (thin-plate) or rounding"
-    )
-    tabulate: float = setting(1.0, above=0, high=1e6, unit="s", help="length of each trajectory that is looked up")
-    horizon: float | None = setting(
-        None, above=0, high=1e6, unit="s", help="window horizon: longest prediction; else what the table leaves"
-    )
-    lift: LiftName = setting("nearest", help="how a state is looked up")
-    coordinates: Coordinates = setting(
-        "state", help="window horizon: what is interpolated, the states or the motion in the world"
-    )
-    neighbours: int | None = setting(None, low=1, high=10_000, help="mls, polyharmonic: nodes at a time; else 24, 60")
-    nodes: int | None = setting(
-        None, low=1, high=1_000_000, help="samples looked up of each trajectory, thinned by voxels; else all"
-    )
-    spacing: int | None = setting(
-        None, low=1, high=1_000_000, help="mls, polyharmonic: samples between neighbours on one trajectory; else any"
-    )
-    radial_power: float = setting(
-        1.0, above=0, high=10, help="distances: power of the distance from standstill; below 1 the middle is spread out"
-    )
-    mirror: tuple[Mirror, ...] = setting((), unique=True, empty=True, help="mirror images that are data too")
-    rounds: int = setting(
-        0, low=0, high=100, help="window horizon: how often short trajectories are continued by the predictor itself"
-    )
-    trust: bool = setting(False, help="window horizon: estimate errors from data held back")
-
-    def settled(self) -> FitEigen:
-        """The same fit: what is left open is written out, what has no effect is reset."""
-        idle = {name: getattr(FitEigen, name) for name in self.idle()}
-        found = replace(self, **{**idle, **({"boundary": "optimal"} if "boundary" in idle else {})})
-        if found.boundary == "thin-plate" and found.cut is None:
-            found = replace(found, cut=1e-14)
-        if found.eigenvalues in PAIRS and found.pairs is None:
-            found = replace(found, pairs=PAIRS[found.eigenvalues])
-        if found.lift in NEIGHBOURS and found.neighbours is None:
-            found = replace(found, neighbours=NEIGHBOURS[found.lift])
-        return found
-
-    def idle(self) -> dict[str, str]:
-        """The settings that have no effect, each with the one that switches it off."""
-        spline = ("centres", "seed", "scaling")
-        off: dict[str, str] = {}
-        if self.window == "horizon":
-            off |= dict.fromkeys(("boundary", *spline), "window")
-        else:
-            off |= dict.fromkeys(("horizon", "coordinates", "rounds", "trust"), "window")
-            if self.boundary == "optimal":
-                off |= dict.fromkeys(spline, "boundary")
-        off |= dict.fromkeys(
-            ("degree",) if self.eigenvalues in PAIRS else ("pairs", "lowest", "highest", "damping"), "eigenvalues"
-        )
-        return off if self.lift in NEIGHBOURS else {**off, "neighbours": "lift", "spacing": "lift"}
-
-
-PAIRS = {"comb": 10, "varpro": 6}  # of complex rates, unless told otherwise
-NEIGHBOURS = {"mls": 24, "polyharmonic": 60}  # at a time, unless told otherwise
+    def settled(self, plant: PlantChoice, steps: int) -> Simulate:
+        """The same simulation of a ``plant``, over so many ``steps`` where that is open."""
+        chunk = plant.chunk if self.chunk is None else self.chunk
+        return replace(self, plant=plant, vehicle=plant.used(self.vehicle), steps=self.steps or steps, chunk=chunk)
 
 
 @dataclass(frozen=True)
@@ -221,7 +76,12 @@ class Evaluate:
     chunk: int = setting(2048, low=1, high=100_000_000, help="trajectories for each committed part")
     relift: bool = setting(True, help="score predictions that are lifted afresh at every step too")
     restart: int | None = setting(
-        None, low=1, high=1_000_000, help="steps until a prediction starts afresh from the true state; else never"
+        None,
+        low=1,
+        high=1_000_000,
+        option=True,
+        help="start the prediction afresh from the true state every so many steps, and score each stretch; of a "
+        "predictor driven by forces the test set is then the paper's trajectory under random inputs (kind point)",
     )
 
 
@@ -230,7 +90,9 @@ class Reproduce:
     """What `koop reproduce` sweeps over."""
 
     orders: tuple[int, ...] = setting(tuple(range(1, 11)), low=1, high=1000, unique=True, help="edmd: basis orders")
-    draws: tuple[Draw, ...] = setting(("random", "even"), unique=True, help="edmd: kinds of training grid")
+    draws: tuple[Literal["random", "even", "chebyshev"], ...] = setting(
+        ("random", "even"), unique=True, help="edmd: kinds of training grid"
+    )
     draw_seeds: tuple[int, ...] = setting(
         (0, 1, 2), low=0, high=SEED_LIMIT, unique=True, help="edmd: seeds of the random training grids"
     )

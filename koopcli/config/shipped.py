@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, fields, is_dataclass
+from dataclasses import dataclass, is_dataclass
 
+from koopcli.checks import written
 from koopcli.config.data import data_folder
-from koopcli.config.plants import UNUSED
-from koopcli.vehicles.parameters import VehicleParameters, read_vehicle
+from koopcli.vehicles.parameters import read_vehicle
 
 DIGITS = 4  # of the digest, in what a vehicle is called that is not shipped
 
@@ -24,13 +24,8 @@ class Fingerprint:
 def fingerprint(source: object, names: tuple[str, ...]) -> Fingerprint:
     """That of the parameters ``names`` of ``source``: a vehicle, or settings that hold some of one."""
     values = {name: getattr(source, name) for name in names}
-    plain = {name: asdict(value) if is_dataclass(value) else value for name, value in values.items()}  # type: ignore[arg-type]
+    plain = {name: written(value) if is_dataclass(value) else value for name, value in values.items()}
     return Fingerprint(names, hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest())
-
-
-def used_by(plant: str) -> tuple[str, ...]:
-    """The parameters that trajectories of the ``plant`` tell."""
-    return tuple(f.name for f in fields(VehicleParameters) if f"vehicle.{f.name}" not in UNUSED[plant])
 
 
 def called(known: Fingerprint) -> str:

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
+from koopcli.checks import told, written
 from koopcli.config.changes import flat
 from koopcli.config.data import data_folder
 from koopcli.config.experiment import DEFAULT_VEHICLE
 from koopcli.config.grids import text_of
-from koopcli.config.plants import used_of
-from koopcli.config.samples import SampleSettings
 from koopcli.config.settings import Simulate
+from koopcli.simulation.samples.sample import SampleChoice
 from koopcli.vehicles.parameters import VehicleParameters, read_vehicle
+from koopcli.vehicles.plants.plant import PlantChoice
 
-OF_PLANT = ("force_per", "v_eps", "combined", "brake_width", "dt")  # settings that make another plant of a vehicle
 Words = dict[str, str]
 
 
-def vehicle_words(vehicle: VehicleParameters, plant: str) -> Words | None:
+def vehicle_words(vehicle: VehicleParameters, plant: PlantChoice) -> Words | None:
     """The shipped vehicle that differs least in what the ``plant`` uses of ``vehicle``, with the differences; None
     where each has something that this one has not.
     """
@@ -36,19 +35,18 @@ def vehicle_words(vehicle: VehicleParameters, plant: str) -> Words | None:
 
 def plant_words(simulate: Simulate) -> Words:
     """What makes another plant of its vehicle than it is by default."""
-    usual = Simulate(vehicle=simulate.vehicle, plant=simulate.plant).settled()
-    mine, theirs = ({name: getattr(one, name) for name in OF_PLANT} for one in (simulate, usual))
-    return _words("simulate", _differing(mine, theirs))
+    period = {} if simulate.dt == Simulate.dt else {"dt": simulate.dt}
+    return _words("simulate", {**(told(simulate.plant) if simulate.plant else {}), **period})
 
 
-def sample_words(sample: SampleSettings, names: Sequence[str]) -> Words:
+def sample_words(sample: SampleChoice, names: Sequence[str]) -> Words:
     """Those of the settings ``names`` of a sample that are not at their defaults."""
     mine, usual = ({name: getattr(one, name) for name in names if hasattr(one, name)} for one in (sample, type(sample)))
     return _words("sample", _differing(mine, usual))
 
 
-def _flat(vehicle: VehicleParameters, plant: str) -> dict[str, Any]:
-    return dict(flat(asdict(used_of(vehicle, plant))))
+def _flat(vehicle: VehicleParameters, plant: PlantChoice) -> dict[str, Any]:
+    return dict(flat(written(plant.used(vehicle))))
 
 
 def _differing(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 
 from koopcli.config.experiment import Experiment
-from koopcli.config.samples import BallSample, EllipsoidSample
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.koopman.predictor.trust import LEVEL
 from koopcli.reproduction import beyond_cells as blocks
@@ -29,6 +28,8 @@ from koopcli.reproduction.report import (
     number_text,
     score_text,
 )
+from koopcli.simulation.samples.ball import BallSample
+from koopcli.simulation.samples.ellipsoid import EllipsoidSample
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline

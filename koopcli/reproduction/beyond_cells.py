@@ -7,11 +7,15 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from koopcli.config.experiment import Experiment
-from koopcli.config.samples import EllipsoidSample, GreedySample, SampleSettings
-from koopcli.config.settings import PAIRS, FitEdmd, FitEigen
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.eigen.rates import lattice_size
+from koopcli.koopman.bases.thin_plate import Splines
+from koopcli.koopman.edmd.fit import FitEdmd
+from koopcli.koopman.eigen.fit import FitEigen
+from koopcli.koopman.eigen.rates.rates import Rates
 from koopcli.reproduction.eigen_cells import CUT, surface
+from koopcli.simulation.samples.ellipsoid import EllipsoidSample
+from koopcli.simulation.samples.greedy import GreedySample
+from koopcli.simulation.samples.sample import SampleChoice
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 
@@ -20,9 +24,9 @@ TABLE, HORIZON = 0.5, 0.5  # s, of trajectories of one second
 THINNED = 20  # nodes of each trajectory, where neighbours are not chosen apart
 LADDER, BUDGETS, EDMD, ABLATION, UNSEEN, MODES = "ladder", "budgets", "edmd", "ablation", "unseen", "modes"
 BESIDE = (
-    FitEdmd(basis="total", order=7),
-    FitEdmd(basis="thin-plate", centres=300),
-    FitEdmd(basis="total", order=9),
+    FitEdmd.of(basis="total", order=7),
+    FitEdmd.of(basis="thin-plate", centres=300),
+    FitEdmd.of(basis="total", order=9),
 )  # EDMD of the same trajectories
 STACKED = 5  # which rung of the ladder has shells
 STATES = 3  # of the plant on tyres
@@ -49,11 +53,11 @@ class Row:
 
     label: str
     design: str
-    states: SampleSettings
+    states: SampleChoice
     fit: FitEigen | FitEdmd
 
 
-AHEAD = FitEigen(window="horizon", eigenvalues="comb", cut=CUT, tabulate=TABLE, horizon=HORIZON)
+AHEAD = FitEigen.of(window="horizon", eigenvalues="comb", cut=CUT, tabulate=TABLE, horizon=HORIZON)
 
 
 def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
@@ -81,7 +85,7 @@ def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
 def ladder(there: Experiment) -> Iterator[Row]:
     """From the paper's reading to the best predictor, an ingredient at a time."""
     gamma, shells = surface(there), f"{SHELLS} shells"
-    paper = FitEigen(boundary="optimal", cut=CUT, tabulate=there.fit_eigen.tabulate)
+    paper = FitEigen.of(boundary="optimal", cut=CUT, tabulate=there.fit_eigen.tabulate)
     comb = replace(paper, eigenvalues="comb")
     yield Row("lattice of rates, nearest sample", "surface", gamma, paper)
     yield Row("lattice of rates, linear", "surface", gamma, replace(paper, lift="linear"))
@@ -115,7 +119,7 @@ def _best_row(there: Experiment) -> Row:
 def budgets(there: Experiment) -> Iterator[Row]:
     """The best predictor on other budgets, and on all of them without mirror images."""
     main, *others = there.reproduce.budgets
-    fit = replace(best_fit(there), trust=False)
+    fit = best_fit(there).but(trust=False)
     alone = replace(fit, mirror=())
     yield Row("best-eigen without images", "greedy", greedy(there, main, plain=True), alone)
     for budget in others:
@@ -126,23 +130,23 @@ def budgets(there: Experiment) -> Iterator[Row]:
 def beside(there: Experiment) -> Iterator[Row]:
     """EDMD on the very same trajectories."""
     for fit in BESIDE:
-        size = f"order {fit.order}" if fit.basis == "total" else f"{fit.centres} centres"
-        yield Row(f"EDMD, {fit.basis}, {size}", "greedy", greedy(there, plain=True), fit)
+        size = f"{fit.basis.centres} centres" if isinstance(fit.basis, Splines) else f"order {fit.basis.order}"
+        yield Row(f"EDMD, {fit.basis.kind}, {size}", "greedy", greedy(there, plain=True), fit)
 
 
 def ablation(there: Experiment) -> Iterator[Row]:
     """The best predictor with one ingredient less, named by what is there instead."""
-    best, states = replace(best_fit(there), trust=False), greedy(there)  # which moves no prediction
+    best, states = best_fit(there).but(trust=False), greedy(there)  # which moves no prediction
     known = round(best.tabulate / there.simulate.dt) - round((best.horizon or HORIZON) / there.simulate.dt)
-    shorter = replace(best, rounds=0, tabulate=known * there.simulate.dt)
-    less: list[tuple[str, SampleSettings, FitEigen]] = [
-        ("rates: lattice", states, replace(best, eigenvalues="dmd")),
-        ("lift: linear", states, replace(best, lift="linear", spacing=None)),
-        ("lift: moving least squares", states, replace(best, lift="mls", neighbours=None)),
-        ("lift: nearest sample", states, replace(best, lift="nearest", spacing=None)),
-        ("coordinates: state", states, replace(best, coordinates="state")),
+    shorter = best.but(rounds=0, tabulate=known * there.simulate.dt)
+    less: list[tuple[str, SampleChoice, FitEigen]] = [
+        ("rates: lattice", states, best.but(eigenvalues="dmd")),
+        ("lift: linear", states, best.but(lift="linear")),
+        ("lift: moving least squares", states, best.but(lift="mls")),
+        ("lift: nearest sample", states, best.but(lift="nearest")),
+        ("coordinates: state", states, best.but(coordinates="state")),
         ("distances: plain", states, replace(best, radial_power=1.0)),
-        ("neighbours: any", states, replace(best, spacing=None)),
+        ("neighbours: any", states, best.but(spacing=None)),
         ("no continuation", states, shorter),
         ("no images", greedy(there, plain=True), replace(best, mirror=())),
         ("all starts on Γ", _on_surface(there, states), best),
@@ -154,8 +158,7 @@ def ablation(there: Experiment) -> Iterator[Row]:
 
 def _along(fit: FitEigen) -> FitEigen:
     """The fit with the paper's window, which has state coordinates and no estimate of its errors."""
-    alike = replace(fit, window="trajectory", boundary="optimal", coordinates="state")
-    return replace(alike, trust=False, horizon=None)
+    return fit.but(window="trajectory", boundary="optimal")
 
 
 def _on_surface(there: Experiment, like: GreedySample) -> EllipsoidSample:
@@ -164,11 +167,10 @@ def _on_surface(there: Experiment, like: GreedySample) -> EllipsoidSample:
 
 def sweep(there: Experiment) -> Iterator[tuple[int, Row]]:
     """How many rates of which kind, everything else as in the best predictor but for what takes long."""
-    best = replace(best_fit(there), rounds=0, tabulate=TABLE, trust=False, spacing=None, nodes=THINNED, pairs=None)
+    best = best_fit(there).but(rounds=0, tabulate=TABLE, trust=False, spacing=None, nodes=THINNED)
     states = greedy(there)
     for fit in recipes.mode_fits(best, there.reproduce.pairs):
-        modes = lattice_size(STATES, fit.degree) if fit.pairs is None else 2 * fit.pairs + 2
-        yield modes, Row(fit.eigenvalues, "greedy, images", states, fit)
+        yield fit.eigenvalues.count(STATES), Row(fit.eigenvalues.kind, "greedy, images", states, fit)
 
 
 def unseen(experiment: Experiment) -> list[tuple[str, Experiment]]:
@@ -211,4 +213,4 @@ def _simulating(there: Experiment) -> Experiment:
 
 
 def _count(kind: str) -> int:
-    return 2 * PAIRS[kind] + 2
+    return Rates.kinds()[kind]().count(STATES)

@@ -8,11 +8,12 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from koopcli.checks import written
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
-from koopcli.config.sampled import INPUTS
 from koopcli.records import Meta
 from koopcli.reproduction import edmd_cells as blocks
 from koopcli.reproduction.report import Run, Table, number_text
+from koopcli.simulation.samples.sample import INPUTS
 
 CLEAR = 1.02  # a ratio of two mean errors from which one is called larger
 WORSE = 1.05  # the same, from the best order to the largest basis
@@ -247,7 +248,8 @@ def _test(run: Run) -> dict[str, object]:
 
 def _show_floor(run: Run) -> Command:
     fit = blocks.bilinear(run.experiment, "generator")
-    return _evaluate(run, basis=fit.basis, order=fit.order, terms=fit.terms)
+    settings = written(fit)
+    return _evaluate(run, **{name: settings[name] for name in ("basis", "order", "terms")})
 
 
 def _show_orders(run: Run) -> Command:

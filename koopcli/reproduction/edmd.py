@@ -7,8 +7,6 @@ from functools import partial
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
-from koopcli.config.sampled import INPUTS
-from koopcli.config.samples import BoxSample, GridSample
 from koopcli.records import Meta
 from koopcli.reproduction import edmd_cells as blocks
 from koopcli.reproduction import headlines
@@ -25,6 +23,9 @@ from koopcli.reproduction.report import (
     has_effect,
     score_text,
 )
+from koopcli.simulation.samples.box import BoxSample
+from koopcli.simulation.samples.grid import GridSample
+from koopcli.simulation.samples.sample import INPUTS
 from koopcli.stages import grid
 
 NOTES = (

@@ -7,13 +7,15 @@ from dataclasses import dataclass, replace
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS
-from koopcli.config.sampled import Draw, Excitation
-from koopcli.config.samples import BoxSample, GridSample
-from koopcli.config.settings import OF_BASIS, BasisName, FitEdmd, ForcePer, Terms
 from koopcli.errors import InvalidValueError
+from koopcli.koopman.edmd.fit import FitEdmd
+from koopcli.simulation.samples.box import BoxSample
+from koopcli.simulation.samples.grid import GridSample
+from koopcli.simulation.samples.sample import Excitation
 from koopcli.stages import recipes, verdict
 from koopcli.stages.base import Task
 from koopcli.stages.makers import outlook
+from koopcli.vehicles.plants.forces import Forces
 
 SWEEP, OTHERS, BASELINES, FORCES, PER_WHEEL, TEST_GRID, TEXTBOOK, DRAWN, DRAWS = (
     "sweep",
@@ -29,7 +31,7 @@ SWEEP, OTHERS, BASELINES, FORCES, PER_WHEEL, TEST_GRID, TEXTBOOK, DRAWN, DRAWS =
 BILINEAR_ORDER = 8  # of the yaw rate, beside degree 1 of the velocity: 27 functions
 TEXTBOOK_ORDERS = (5, 6, 7)  # where the normal equations of monomials end
 RESTART = 50  # samples, as in the paper's figure
-SPLINES: BasisName = "thin-plate"
+SPLINES: str = "thin-plate"
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Cell:
 class Training:
     """A training grid by its draw, and what it is called."""
 
-    draw: Draw
+    draw: str
     seed: int
 
     @property
@@ -81,9 +83,10 @@ def best_order(experiment: Experiment) -> int:
 def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
     """Every cell of the experiment with its evaluation."""
     plan = experiment.reproduce
-    if "order" not in OF_BASIS[experiment.fit_edmd.basis]:
+    basis = experiment.fit_edmd.basis
+    if not hasattr(basis, "order"):
         raise InvalidValueError(
-            f"reproduce edmd sweeps orders, which the basis '{experiment.fit_edmd.basis}' has none of: leave it out"
+            f"reproduce edmd sweeps orders, which the basis '{basis.kind}' has none of: leave it out"
         )
     for training in trainings(experiment):
         for order in plan.orders:
@@ -99,16 +102,15 @@ def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
                 yield from _scored(experiment, DRAWS, "", training, fit, (excitation(experiment),))
 
 
-def bilinear(experiment: Experiment, terms: Terms) -> FitEdmd:
+def bilinear(experiment: Experiment, terms: str) -> FitEdmd:
     """Bilinear terms on a constant and a linear velocity times powers of the yaw rate."""
     order = min(BILINEAR_ORDER, grid(experiment).count - 1)
-    return FitEdmd(basis="anisotropic", order=order, terms=terms)
+    return FitEdmd.of(basis="anisotropic", order=order, terms=terms)
 
 
 def splines(experiment: Experiment) -> FitEdmd:
     """Thin-plate splines, with the experiment's centres."""
-    given = experiment.fit_edmd
-    return FitEdmd(basis=SPLINES, centres=given.centres, placement=given.placement, seed=given.seed)
+    return FitEdmd(experiment.fit("fit-edmd", basis=SPLINES).basis)
 
 
 def compared(experiment: Experiment) -> list[Task]:
@@ -153,17 +155,19 @@ def _settings(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
     """Assumptions the paper leaves open, and how the textbook's regression fares."""
     first = trainings(experiment)[0]
     best = recipes.with_order(experiment, best_order(experiment)).fit_edmd
-    other: ForcePer = "axle" if experiment.simulate.force_per == "wheel" else "wheel"
-    elsewhere = replace(experiment, simulate=replace(experiment.simulate, force_per=other))
-    yield from _scored(elsewhere, PER_WHEEL, f"force per {other}", first, best)
+    plant = experiment.plant_for(Forces)
+    assert isinstance(plant, Forces)
+    other = Forces("axle" if plant.force_per == "wheel" else "wheel")
+    elsewhere = replace(experiment, simulate=replace(experiment.simulate, plant=other))
+    yield from _scored(elsewhere, PER_WHEEL, f"force per {other.force_per}", first, best)
     data = training_set(experiment, first)
     predictor = recipes.fit_edmd(replace(experiment, fit_edmd=best), data)
     side = round(box(experiment).count ** (1 / 3))
     for kind in experiment.reproduce.excitations:
         task = _evaluated(experiment, predictor, kind, layout="product", count=side**3)
-        yield Cell(TEST_GRID, f"{side}³ test states on a grid", first.name, best.order, kind), task
+        yield Cell(TEST_GRID, f"{side}³ test states on a grid", first.name, _order(best), kind), task
     for order in (order for order in TEXTBOOK_ORDERS if order in experiment.reproduce.orders):
-        fit = replace(FitEdmd(order=order), solver="cholesky-monomials")
+        fit = FitEdmd.of(order=order, solver="cholesky-monomials")
         yield from _scored(experiment, TEXTBOOK, "cholesky-monomials", first, fit, (excitation(experiment),))
     restarting = replace(experiment, evaluate=replace(experiment.evaluate, restart=RESTART))
     for fit in (best, bilinear(experiment, "bilinear"), bilinear(experiment, "generator")):
@@ -195,7 +199,7 @@ def _scored(
 
 
 def _order(fit: FitEdmd) -> int | None:
-    return None if fit.basis == SPLINES else fit.order
+    return getattr(fit.basis, "order", None)
 
 
 def training_set(experiment: Experiment, training: Training, **changed: object) -> Task:

@@ -7,10 +7,11 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from koopcli.checks import written
 from koopcli.config.experiment import DEFAULT_VEHICLE, Experiment, vehicle_named
 from koopcli.config.paper import EIGEN_RMSE
-from koopcli.config.samples import BallSample, EllipsoidSample
-from koopcli.config.settings import FitEigen, Simulate
+from koopcli.config.settings import Simulate
+from koopcli.koopman.eigen.fit import FitEigen
 from koopcli.records import Meta
 from koopcli.reproduction import headlines
 from koopcli.reproduction.eigen_cells import (
@@ -38,6 +39,8 @@ from koopcli.reproduction.report import (
     number_text,
     score_text,
 )
+from koopcli.simulation.samples.ball import BallSample
+from koopcli.simulation.samples.ellipsoid import EllipsoidSample
 from koopcli.stages import recipes
 
 SIZES = (count_text(EllipsoidSample.count), count_text(BallSample.count, BallSample.steps))  # the paper's
@@ -202,7 +205,7 @@ def _as_in_the_paper(experiment: Experiment) -> bool:
     start, test = surface(experiment), ball(experiment)
     m, Jzz = start.m, start.Jzz
     return (
-        experiment.fit_eigen.settled() == FitEigen().settled()
+        experiment.fit_eigen == FitEigen()
         and experiment.vehicle == vehicle_named(DEFAULT_VEHICLE)
         and start == EllipsoidSample(m=m, Jzz=Jzz)
         and replace(test, seed=BallSample.seed) == BallSample(m=m, Jzz=Jzz)
@@ -251,9 +254,9 @@ def _tests(test: BallSample) -> str:
 
 
 def _about(fit: FitEigen) -> str:
-    settled = fit.settled()
-    splines = f", {fit.centres} centres" if fit.boundary == "thin-plate" else ""
-    return f"{fit.boundary}{splines}{cut_text(settled.cut)}, sums of up to {fit.degree} rates"
+    s = written(fit)
+    splines = f", {s['centres']} centres" if s["boundary"] == "thin-plate" else ""
+    return f"{s['boundary']}{splines}{cut_text(s['cut'])}, sums of up to {s['degree']} rates"
 
 
 FOREIGN = (

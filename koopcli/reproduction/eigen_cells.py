@@ -6,10 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
+from koopcli.checks import written
 from koopcli.config.experiment import Experiment
-from koopcli.config.samples import BallSample, EllipsoidSample
-from koopcli.config.settings import FitEigen
 from koopcli.errors import InvalidValueError
+from koopcli.koopman.eigen.fit import FitEigen
+from koopcli.simulation.samples.ball import BallSample
+from koopcli.simulation.samples.ellipsoid import EllipsoidSample
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 from koopcli.stages.makers import outlook
@@ -39,41 +41,41 @@ def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
     first = plan.seeds[0]
     everywhere = recipes.vehicles(experiment)
     as_given = experiment.fit_eigen
-    splines = FitEigen(tabulate=as_given.tabulate)  # a row means what it says, whatever the experiment changes
-    optimal = replace(splines, boundary="optimal")
+    splines = FitEigen.of(tabulate=as_given.tabulate)  # a row means what it says, whatever the experiment changes
+    optimal = splines.but(boundary="optimal")
 
     for (vehicle, there), seed in product(everywhere, plan.seeds):
         yield Cell(HEADLINE, "as the experiment says", vehicle, seed), evaluated(there, as_given, seed)
     for centres in CENTRES:
-        fit = replace(splines, centres=centres, scaling="extent")
+        fit = splines.but(centres=centres, scaling="extent")
         yield Cell(READINGS, f"thin-plate, {centres} centres, scaled", main, first), evaluated(experiment, fit, first)
     for cut in (None, CUT):
-        fit = replace(splines, centres=FEW_CENTRES, cut=cut)
+        fit = splines.but(centres=FEW_CENTRES, **({} if cut is None else {"cut": cut}))
         yield (
             Cell(READINGS, f"thin-plate, {FEW_CENTRES} centres{cut_text(cut)}", main, first),
             evaluated(experiment, fit, first),
         )
     for cut in (None, CUT):
-        fit = replace(optimal, cut=cut)
+        fit = optimal.but(cut=cut)
         for (vehicle, there), seed in product(everywhere, plan.seeds):
             yield Cell(READINGS, f"optimal{cut_text(cut)}", vehicle, seed), evaluated(there, fit, seed)
         for degree in (1, 3):
             label = f"optimal{cut_text(cut)}, sums of up to {degree}"
-            yield Cell(READINGS, label, main, first), evaluated(experiment, replace(fit, degree=degree), first)
+            yield Cell(READINGS, label, main, first), evaluated(experiment, fit.but(degree=degree), first)
         literal = replace(fit, tabulate=LITERAL_TABLE)
         label = f"optimal{cut_text(cut)}, {LITERAL_STEPS:g} s simulated, {LITERAL_TABLE:g} s tabulated"
         yield Cell(READINGS, label, main, first), evaluated(experiment, literal, first, seconds=LITERAL_STEPS)
     peaked = _with_peak(experiment)
     label = f"optimal{cut_text(CUT)}, D = {PEAK:g} N"
-    yield Cell(READINGS, label, main, first), evaluated(peaked, replace(optimal, cut=CUT), first)
+    yield Cell(READINGS, label, main, first), evaluated(peaked, optimal.but(cut=CUT), first)
     for fit, cut in product((splines, optimal), plan.cuts):
-        label = f"{fit.boundary}, cut {cut:g}"
-        yield Cell(CUTS, label, main, first), evaluated(experiment, replace(fit, cut=cut), first)
+        label = f"{written(fit)['boundary']}, cut {cut:g}"
+        yield Cell(CUTS, label, main, first), evaluated(experiment, fit.but(cut=cut), first)
     for vehicle, there in everywhere:
         for scale in plan.mu_scales:
             gripping = there.with_parameters(mu_scale=scale * there.vehicle.mu_scale)
             yield Cell(GRIP, f"grip × {scale:g}", vehicle, first), evaluated(gripping, as_given, first)
-            label, fit = f"grip × {scale:g}, optimal{cut_text(CUT)}", replace(optimal, cut=CUT)
+            label, fit = f"grip × {scale:g}, optimal{cut_text(CUT)}", optimal.but(cut=CUT)
             yield Cell(GRIP, label, vehicle, first), evaluated(gripping, fit, first)
         for predictor in recipes.beside(there, _training(there)):
             yield Cell(BASELINES, outlook(predictor).name, vehicle, first), _scored(there, predictor, first)

@@ -19,7 +19,7 @@ from koopcli.stages.pipeline import Pipeline
 from koopcli.vehicles.handling import G
 from koopcli.vehicles.parameters import VehicleParameters
 from koopcli.vehicles.plants import remembered_plant
-from koopcli.vehicles.single_track import ForceInput
+from koopcli.vehicles.plants.forces import ForceInput
 
 SECONDS, SPEED = 0.8, 20.0  # of the swerve; s, m/s
 SIDEWAYS = 0.9 * G  # largest lateral acceleration, m/s²

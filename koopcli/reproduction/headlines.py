@@ -8,11 +8,11 @@ from dataclasses import replace
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE, EIGEN_RMSE
-from koopcli.config.sampled import INPUTS
-from koopcli.config.samples import GreedySample
 from koopcli.records import Meta
 from koopcli.reproduction import beyond_cells, edmd_cells, eigen_cells
 from koopcli.reproduction.report import Lead, Number, Race, Run, count_text, mean_text, number_text
+from koopcli.simulation.samples.greedy import GreedySample
+from koopcli.simulation.samples.sample import INPUTS
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 
@@ -125,7 +125,7 @@ def _eigen_race(experiment: Experiment) -> Race:
     assert isinstance(states, GreedySample)
     budget = max(states.budget / SHARE, FEWEST * states.steps * states.dt)
     few = recipes.sample(replace(states, budget=budget, candidates=min(CANDIDATES, states.candidates)))
-    there = replace(best, fit_eigen=replace(best.fit_eigen, trust=False))
+    there = replace(best, fit_eigen=best.fit_eigen.but(trust=False))
     fit = recipes.fit_eigen(there, recipes.simulation(there, few, plant="slips"))
     label = f"best-eigen on {few.settings.count * states.steps * states.dt:.0f} s of simulation"
     return Race((("the paper's method", evaluation.input("predictor")), (label, fit)), evaluation)

@@ -9,12 +9,12 @@ from typing import Any
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import FigureName, ImageFormat
-from koopcli.config.plants import UNUSED
 from koopcli.records import Meta
 from koopcli.stages import drawn
 from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline
 from koopcli.store import Record
+from koopcli.vehicles.plants import PLANTS
 
 REDUCED = "This run is not of the paper's size: its numbers cannot be put beside the paper's."
 RASTERS: frozenset[FigureName] = frozenset({"error-map", "error-side", "energy-surface", "density", "spectrum"})
@@ -174,7 +174,9 @@ def has_effect(name: str, *, plant: str, swept: Sequence[str], foreign: Sequence
     section, _, key = name.partition(".")
     if section == "reproduce":
         return key in swept
-    return not any(f"{name}.".startswith(f"{other}.") for other in (*UNUSED[plant], *foreign))
+    return not any(
+        f"{name}.".startswith(f"{other}.") for other in (*(f"vehicle.{key}" for key in PLANTS[plant].unused), *foreign)
+    )
 
 
 def full_table(method: Method, runs: Sequence[Run]) -> Table:

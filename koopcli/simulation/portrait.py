@@ -11,10 +11,9 @@ import numpy as np
 from koopcli.errors import InvalidValueError
 from koopcli.simulation.integrate import substeps
 from koopcli.vehicles import handling
-from koopcli.vehicles.options import CUSTOMARY, Options
 from koopcli.vehicles.parameters import VehicleParameters
 from koopcli.vehicles.plants import PLANTS
-from koopcli.vehicles.single_track import TorqueInput
+from koopcli.vehicles.plants.wheels import TorqueInput
 
 SPEEDS = (1.0, 5.0, 30.0)  # m/s
 USUAL: dict[str, tuple[float, float, str]] = {
@@ -41,7 +40,7 @@ def plants_of(p: VehicleParameters) -> list[str]:
     found = []
     for name, plant in PLANTS.items():
         try:
-            plant.configured(p, Options())
+            plant().of(p)
         except InvalidValueError:
             continue
         found.append(name)
@@ -69,7 +68,7 @@ def derived(p: VehicleParameters, dt: float) -> list[Derived]:
     if p.r_w is None or p.J_R is None:
         return found
     for speed in SPEEDS:
-        pole = max(handling.wheel_poles(p, speed, CUSTOMARY["wheels"]["v_eps"]))
+        pole = max(handling.wheel_poles(p, speed, TorqueInput.v_eps))
         found.append(Derived(f"wheel pole at {speed:g} m/s", pole, "1/s"))
         found.append(Derived(f"substeps at {speed:g} m/s", _substeps(p, speed, dt), "1"))
     return found

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from koopcli.checks import written
 from koopcli.config.experiment import load_experiment
 from koopcli.config.measured import COASTING, INPUTS, TYRES, WHEELS, Gain
-from koopcli.config.samples import EllipsoidSample, GreedySample, GridSample, SampleSettings
-from koopcli.config.settings import FitEdmd, FitName
-from koopcli.config.words import OF_PLANT
+from koopcli.config.settings import FitName
+from koopcli.koopman.edmd.fit import FitEdmd
 from koopcli.records import Meta
+from koopcli.simulation.samples.ellipsoid import EllipsoidSample
+from koopcli.simulation.samples.greedy import GreedySample
+from koopcli.simulation.samples.grid import GridSample
+from koopcli.simulation.samples.sample import SampleChoice
 from koopcli.stages.base import Task
 from koopcli.stages.makers import LIFTED
 from koopcli.stages.usable import roles_of
@@ -29,7 +33,7 @@ class Case:
     """The plant of both."""
     fit: Any
     """The settings of the predictor's fit."""
-    sample: SampleSettings | None
+    sample: SampleChoice | None
     """Where its training trajectories start; None where that is no longer known, or of several."""
     trained: bool
     """Whether inputs move the training trajectories."""
@@ -86,12 +90,12 @@ def case_of(evaluation: Task, figures: Meta) -> Case | None:
         return None
     mine, theirs = data[0].settings, test.settings
     return Case(
-        plant=mine.plant,
+        plant=mine.plant.kind,
         fit=predictor.settings,
         sample=samples[0] if len(samples) == 1 else None,
         trained=any(sample.driven for sample in samples),
         tested=tested.settings.driven,
-        elsewhere=any(getattr(mine, name) != getattr(theirs, name) for name in ("plant", "vehicle", *OF_PLANT)),
+        elsewhere=any(getattr(mine, name) != getattr(theirs, name) for name in ("plant", "vehicle", "dt")),
         diverged=figures["diverged"] > 0,
     )
 
@@ -105,20 +109,20 @@ def advise(case: Case) -> Advice:
             "no input moves in the training data, so the predictor knows nothing of them: sample some that do"
         )
     why = next(text for holds, text in REASONS if holds(case))
-    return Advice(why, PAGES[case.plant], RULES[case.plant](case))
+    return Advice(why, PAGES.get(case.plant, ""), RULES.get(case.plant, lambda case: None)(case))
 
 
 REASONS: tuple[tuple[Callable[[Case], bool], str], ...] = (
     (
-        lambda case: case.edmd and case.diverged and case.fit.basis != "states",
+        lambda case: case.edmd and case.diverged and case.fit.basis.kind != "states",
         "outside the data the fitted functions grow without bound",
     ),
     (
-        lambda case: case.edmd and case.tested and case.fit.terms == "linear",
+        lambda case: case.edmd and case.tested and case.fit.terms.kind == "linear",
         "a constant B limits it: inputs act through products with the state",
     ),
     (
-        lambda case: case.edmd and case.tested and case.fit.terms == "bilinear",
+        lambda case: case.edmd and case.tested and case.fit.terms.kind == "bilinear",
         "bilinear steps leave out what is of second order in the inputs",
     ),
     (
@@ -144,20 +148,21 @@ def _forces(case: Case) -> Better | None:
     grid = case.sample if isinstance(case.sample, GridSample) else None
     if case.tested:
         best = load_experiment("best-edmd", {}).fit_edmd
-        order = best.order if grid is None else min(best.order, grid.count - 1)
-        changes = {} if order == best.order else {"order": order}
-        if order < 1 or _same_fit(case.fit, replace(best, order=order)):
+        usual = written(best)["order"]
+        order = usual if grid is None else min(usual, grid.count - 1)
+        changes = {} if order == usual else {"order": order}
+        if order < 1 or _same_fit(case.fit, best.but(order=order)):
             return None
         return Better("fit-edmd", "same", INPUTS, "best-edmd", changes=changes)
-    wanted = FitEdmd(order=COASTING_ORDER)
-    if grid is None or grid.count <= wanted.order or (_same_fit(case.fit, wanted) and grid.draw == "even"):
+    wanted = FitEdmd.of(order=COASTING_ORDER)
+    if grid is None or grid.count <= COASTING_ORDER or (_same_fit(case.fit, wanted) and grid.draw == "even"):
         return None
     return Better(
         "fit-edmd",
         "own",
         COASTING,
         sample={"draw": "even"},
-        changes={"order": wanted.order},
+        changes={"order": COASTING_ORDER},
         keeps=("seed", "count", "box", "levels", "columns"),
     )
 
@@ -165,14 +170,14 @@ def _forces(case: Case) -> Better | None:
 def _slips(case: Case) -> Better | None:
     """The best eigenfunctions, for whatever coasts on tyres."""
     best = load_experiment("best-eigen", {})
-    if isinstance(case.sample, GreedySample) and case.fit == best.fit_eigen.settled():
+    if isinstance(case.sample, GreedySample) and case.fit == best.fit_eigen:
         return None
     return None if case.tested else Better("fit-eigen", "own", TYRES, "best-eigen", keeps=("energy",))
 
 
 def _wheels(case: Case) -> Better | None:
     """Bilinear terms of few functions."""
-    if not case.edmd or case.fit.terms != "linear" or not case.tested:
+    if not case.edmd or case.fit.terms.kind != "linear" or not case.tested:
         return None
     return Better("fit-edmd", "same", WHEELS, changes=FEW)
 
@@ -182,6 +187,4 @@ RULES = {"forces": _forces, "slips": _slips, "wheels": _wheels}
 
 def _same_fit(one: FitEdmd, other: FitEdmd) -> bool:
     """Whether two fits have the same functions and terms."""
-    mine, theirs = one.settled(), other.settled()
-    names = ("basis", "order", "degree_velocity", "terms")
-    return all(getattr(mine, name) == getattr(theirs, name) for name in names)
+    return (one.basis, one.terms) == (other.basis, other.terms)

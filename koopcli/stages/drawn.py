@@ -7,21 +7,20 @@ from dataclasses import dataclass
 from typing import Any
 
 from koopcli.checks import build
-from koopcli.config.driving import ManoeuvreSample
 from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Cone, ImageFormat, Plot, Series
-from koopcli.config.samples import SAMPLED_FOR
 from koopcli.config.settings import FitName, Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError
 from koopcli.figures import source_digest
 from koopcli.figures.registry import FIGURES, FigureKind
 from koopcli.simulation.manoeuvres import MANOEUVRES
+from koopcli.simulation.samples.manoeuvre import ManoeuvreSample
+from koopcli.simulation.samples.point import PointSample
 from koopcli.stages import grid, recipes
 from koopcli.stages.base import Task
 from koopcli.stages.makers import LIFTED, MAKERS
 from koopcli.stages.naming import names, points
 from koopcli.stages.subject import of_tyres, subject
-from koopcli.vehicles.plants import PLANTS
 
 TAKES: dict[str, tuple[str, ...]] = {
     "evaluation": ("evaluate",),
@@ -168,7 +167,7 @@ def figure(
     _check(name, kind, artefacts)
     if kind.takes == "predictor":
         for task in artefacts:
-            _check_plant(name, task, simulated(task).plant)
+            _check_plant(name, task, simulated(task))
     inputs = tuple(
         (f"{i}/{role}", _behind(task, role, experiment, simulated))
         for i, task in enumerate(artefacts)
@@ -199,13 +198,14 @@ def _check(name: str, kind: FigureKind, artefacts: Sequence[Task]) -> None:
             _check_shared(name, artefacts[0], other)
 
 
-def _check_plant(name: str, predictor: Task, plant: str | None) -> None:
+def _check_plant(name: str, predictor: Task, simulation: Simulate) -> None:
     """Refuse a predictor of a plant that the trajectory made for the figure cannot drive."""
-    meant = SAMPLED_FOR["point"]
+    meant = PointSample.meant_for
+    plant = simulation.plant
     assert plant is not None, "settled when it was simulated"
-    if PLANTS[plant].inputs != PLANTS[meant].inputs:
+    if plant.inputs != meant.inputs:
         raise InvalidValueError(
-            f"the figure '{name}' takes predictors of the plant '{meant}', {predictor.name} is of '{plant}'"
+            f"the figure '{name}' takes predictors of the plant '{meant.kind}', {predictor.name} is of '{plant.kind}'"
         )
 
 
@@ -214,7 +214,7 @@ def _check_shared(name: str, one: Task, other: Task) -> None:
     here, there = one.input("trajectories"), other.input("trajectories")
     if here.settings.plant != there.settings.plant:
         raise InvalidValueError(
-            f"{one.name} is of the plant '{here.settings.plant}', {other.name} of '{there.settings.plant}': the figure "
+            f"{one.name} is of the plant '{here.settings.plant.kind}', {other.name} of '{there.settings.plant.kind}': the figure "
             f"'{name}' draws predictors of one plant, on one test set"
         )
     if here != there:

@@ -1,94 +1,79 @@
-"""Which settings have an effect on what is made: one that has none is refused rather than ignored."""
+"""Which changes have an effect on what is made: one that has none is refused rather than ignored."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from koopcli.config.driving import MAGNITUDES
-from koopcli.config.experiment import Experiment
-from koopcli.config.plants import UNUSED
-from koopcli.config.samples import ELSEWHERE, OF_VEHICLE, SAMPLED_FOR
+from koopcli.checks import taken, written
+from koopcli.config.experiment import KINDS, Experiment
+from koopcli.errors import KoopError
 from koopcli.stages.base import Task
 
+Plan = Callable[[Experiment], Sequence[Task]]
 
-def why_idle(name: str, experiment: Experiment, tasks: Sequence[Task], reads: Sequence[str] = ()) -> str | None:
-    """Why the setting ``name`` has no effect on any of ``tasks``, or None where it has one.
 
-    ``reads``: settings, or sections of them, that have one whatever the stages use.
+def why_idle(name: str, experiment: Experiment, plan: Plan, tasks: Sequence[Task]) -> str | None:
+    """Why the change ``name`` of the command line has no effect on the ``tasks`` that ``plan`` makes of the experiment.
+
+    It has none where the same tasks are planned without it. None where it has one, where its value is the one that is
+    in effect anyway, and for the name of a vehicle, of which another may make the same.
     """
-    if any(f"{name}.".startswith(f"{one}.") for one in reads):
+    if name == "vehicle.name":
         return None
-    section, _, key = name.partition(".")
-    behind = [step for task in tasks for step in task.upstream()]
-    if section in ("sample", "test"):
-        return _idle_sample(section, key, tasks, behind)
-    stages = {step.stage for step in behind}
-    if ELSEWHERE.get(key) == section and any(hasattr(step.settings, key) for step in behind if step.stage == "sample"):
-        return None
-    if tasks and section != "vehicle" and section not in stages - {"plot"}:  # a figure reads what it is told of
-        return _of_nothing(tasks, "the fit is named" if section == "experiment" else "nothing is made by it")
-    if section in ("vehicle", "simulate"):
-        return _idle_in_plants(name, key, tasks, behind)
-    return _idle_in_fit(section, key, experiment)
-
-
-def _of_nothing(tasks: Sequence[Task], otherwise: str = "nothing is made by it") -> str:
-    drawn = tasks[0].stage == "plot"
-    return f"the figure '{tasks[0].settings.figure}' draws nothing of it" if drawn else otherwise
-
-
-def _idle_sample(section: str, key: str, tasks: Sequence[Task], behind: Sequence[Task]) -> str | None:
-    """Of a setting of samples, of one kind or of the kind in use, which only evaluations have."""
-    tested = _test_samples(behind, ("evaluate", "plot"))
-    relevant = tested if section == "test" else _samples(behind) - tested or tested
-    driven = {getattr(one.settings, "excitation", None) for one in relevant}
-    if key.rpartition(".")[2] in ("amplitude", *MAGNITUDES) and driven == {"none"}:
-        return "the excitation 'none' has no use for it"
-    if "." not in key:
-        in_use = _test_samples(behind, ("evaluate",)) if section == "test" else relevant
-        return _of_nothing(tasks) if tasks and not in_use else None
-    kind = key.partition(".")[0]
-    return None if kind in {one.settings.kind for one in relevant} else f"no {section} of kind '{kind}' is used"
-
-
-def _idle_in_plants(name: str, key: str, tasks: Sequence[Task], behind: Sequence[Task]) -> str | None:
-    """Of a setting of the vehicle or of its simulation."""
-    plants = {step.settings.plant for step in behind if step.stage == "simulate"}
-    samples = [step.settings for step in behind if step.stage == "sample"]
-    plants |= {SAMPLED_FOR[one.kind] for one in samples if hasattr(one, "vehicle")}
-    own = OF_VEHICLE if key == "name" else (key,) if key in OF_VEHICLE else ()
-    if not plants and not any(hasattr(one, name) for one in samples for name in own):
-        if tasks and tasks[0].stage == "plot":
-            return _of_nothing(tasks)
-        if key == "name":  # another vehicle may make the same, and that is said instead
+    try:
+        other = experiment.without(name)
+        if list(plan(other)) != list(tasks):
             return None
-        return "only samples by kinetic energy depend on the vehicle, through its m and Jzz, and those on wheels (r_w)"
-    unused = [plant for plant in plants if any(f"{name}.".startswith(f"{one}.") for one in UNUSED[plant])]
-    return f"the plant '{unused[0]}' has no use for it" if plants and len(unused) == len(plants) else None
+    except KoopError:
+        return None
+    steps = list(dict.fromkeys(step for task in tasks for step in task.upstream()))
+    return None if _in_effect(name, experiment, other, steps) else _reason(name, tasks, steps)
 
 
-def _idle_in_fit(section: str, key: str, experiment: Experiment) -> str | None:
-    """Of a setting of a fit that another one switches off."""
-    if section == "fit-edmd":
-        fit, chosen = experiment.fit_edmd, "basis"
-        idle = getattr(fit.settled(), key) != getattr(fit, key)
-        return f"{section}.{chosen} '{fit.basis}' has no use for it" if idle else None
-    if section == "fit-eigen" and key in (off := experiment.fit_eigen.idle()):
-        return f"{section}.{off[key]} '{getattr(experiment.fit_eigen, off[key])}' has no use for it"
-    return None
+def _in_effect(name: str, experiment: Experiment, other: Experiment, steps: Sequence[Task]) -> bool:
+    """Whether the value of the change is that of the experiment without it, or of what is made."""
+    section, _, key = name.partition(".")
+    if section in KINDS:
+        kinds = {step.settings.kind for step in steps if step.stage == "sample"} & set(KINDS[section])
+        given = [(kind, experiment.value(name, kind)) for kind in sorted(kinds) if _has(experiment, name, kind)]
+        if any(value == other.value(name, kind) for kind, value in given):
+            return True
+        made = [written(step.settings) for step in steps if step.stage == "sample"]
+        return any(one["kind"] == kind and one.get(key) == value for one in made for kind, value in given)
+    value = experiment.value(name)
+    made = [written(step.settings) for step in steps if step.stage == section]
+    return value == other.value(name) or any(one.get(key.rpartition(".")[2], _NOTHING) == value for one in made)
 
 
-def _samples(behind: Sequence[Task]) -> set[Task]:
-    return {step for step in behind if step.stage == "sample"}
+_NOTHING = object()
 
 
-def _test_samples(behind: Sequence[Task], stages: Sequence[str]) -> set[Task]:
-    """The samples that steps of ``stages`` among ``behind`` test on."""
-    tests = [
-        task
-        for step in behind
-        if step.stage in stages
-        for role, task in step.inputs
-        if role.rpartition("/")[2] == "trajectories"
-    ]
-    return {sample for test in tests for sample in _samples(list(test.upstream()))}
+def _has(experiment: Experiment, name: str, kind: str) -> bool:
+    try:
+        experiment.value(name, kind)
+    except KoopError:
+        return False
+    return True
+
+
+def _reason(name: str, tasks: Sequence[Task], steps: Sequence[Task]) -> str:
+    """Why nothing depends on a setting, in words."""
+    section, _, key = name.partition(".")
+    samples = [step.settings for step in steps if step.stage == "sample"]
+    plants = list(dict.fromkeys(step.settings.plant.kind for step in steps if step.stage == "simulate"))
+    used = {step.stage for step in steps} | ({"test"} if samples else set()) | ({"vehicle"} if plants else set())
+    if section not in used and not (section in ("vehicle", "simulate") and any(taken(type(one)) for one in samples)):
+        if tasks[0].stage == "plot":
+            return f"the figure '{tasks[0].settings.figure}' draws nothing of it"
+        if section == "experiment":
+            return "the fit is named"
+        if section == "vehicle" and samples:
+            return f"a sample of kind '{samples[0].kind}' does not depend on the vehicle"
+        return "nothing is made by it"
+    if section in KINDS and "." in key and key.partition(".")[0] not in {one.kind for one in samples}:
+        return f"no {section} of kind '{key.partition('.')[0]}' is used"
+    if section in ("vehicle", "simulate") and plants:
+        return f"the plant '{plants[0]}' has no use for it"
+    if section in KINDS and {getattr(one, "excitation", "") for one in samples} & {"none"}:
+        return "the excitation 'none' has no use for it"
+    return "the same is made without it"

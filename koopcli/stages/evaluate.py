@@ -17,7 +17,6 @@ from koopcli.records import Meta, Packed
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
 from koopcli.stages.makers import outlook
 from koopcli.stages.usable import finished
-from koopcli.vehicles.plants import PLANTS
 
 SAMPLES = 500_000  # scored together, however long the trajectories of a chunk are
 
@@ -92,9 +91,9 @@ def _describe(figures: Meta, settings: Evaluate) -> str:
 
 def _check(task: Task) -> None:
     trained, tested = task.input("predictor").find("simulate"), task.input("trajectories").settings.plant
-    if trained is not None and PLANTS[trained.settings.plant].inputs != PLANTS[tested].inputs:
+    if trained is not None and trained.settings.plant.inputs != tested.inputs:
         raise InvalidValueError(
-            f"the predictor is of the plant '{trained.settings.plant}', the test trajectories of '{tested}': "
+            f"the predictor is of the plant '{trained.settings.plant.kind}', the test trajectories of '{tested.kind}': "
             "they have different states or inputs"
         )
     steps = task.input("trajectories").settings.steps

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from koopcli.config.changes import nested
 from koopcli.config.experiment import Experiment, load_experiment
 from koopcli.config.grids import Grid, GridAxis
-from koopcli.config.samples import GridSample
 from koopcli.config.settings import Sweep, SweepAxis
-from koopcli.errors import InvalidValueError, UsageError
+from koopcli.errors import InvalidValueError, MisplacedError, UsageError
 from koopcli.progress import Progress, silent
+from koopcli.simulation.samples.grid import GridSample
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 from koopcli.stages.effects import why_idle
@@ -45,21 +46,30 @@ def cells(
     """The cells of a ``grid`` over the experiment ``base``, those that come to the same only once.
 
     ``method``: what makes the predictors, else the fit that each experiment is about. A value that no experiment takes
-    is refused at once; a cell whose settings do not go together, as ``check`` says, is kept with the reason. Raises
-    ``UsageError`` for a setting that changes nothing in any cell, and what the first cell is refused for where all of
-    them are.
+    is refused at once; a cell whose settings do not go together, as ``check`` says, is kept with the reason. A setting
+    of one kind is left out of the cells of others. Raises ``UsageError`` for a setting that changes nothing in any
+    cell, and what the first cell is refused for where all of them are.
     """
     make: Callable[[Experiment], Task] = recipes.predictor if method is None else recipes.METHODS[method]
-    reads = recipes.CHOSEN if method is None else ()
-    found: dict[Task, Cell] = {}
-    idle: dict[str, str | None] = {}
-    reasons: list[InvalidValueError] = []
+
+    def plan(experiment: Experiment) -> list[Task]:
+        return [recipes.evaluation(experiment, make(experiment))]
+
+    tasks: dict[tuple[int, ...], Task] = {}
+    misplaced: list[MisplacedError] = []
     for count, (place, settings) in enumerate(grid.cells(), 1):
-        experiment = load_experiment(base, nested(settings))
-        task = recipes.evaluation(experiment, make(experiment))
-        why = {name: why_idle(name, experiment, [task], reads) for name, _ in settings}
-        idle = {name: reason and idle.get(name, reason) for name, reason in why.items()}
-        placed = tuple(-1 if why[axis.name] else i for axis, i in zip(grid.axes, place, strict=True))
+        experiment, left_out = _experiment(base, settings)
+        misplaced += left_out
+        (tasks[place],) = plan(experiment)
+        progress(count, len(grid))
+    for error in misplaced:
+        if [other.setting for other in misplaced].count(error.setting) == len(grid):
+            raise error
+    _refuse_idle(grid, base, plan, tasks)
+    found: dict[Task, Cell] = {}
+    reasons: list[InvalidValueError] = []
+    for place, task in tasks.items():
+        placed = tuple(-1 if _idle(grid, tasks, place, axis) else i for axis, i in enumerate(place))
         if task not in found:
             refused = ""
             try:
@@ -70,13 +80,45 @@ def cells(
             found[task] = Cell(placed, task, refused)
         elif placed != found[task].place:
             found[task] = replace(found[task], same=(*found[task].same, placed))
-        progress(count, len(grid))
-    for name, reason in idle.items():
-        if reason:
-            raise UsageError(f"{name} changes nothing here: {reason}")
     if len(reasons) == len(found):
         raise reasons[0]
     return list(found.values())
+
+
+def _experiment(base: str, settings: Sequence[tuple[str, Any]]) -> tuple[Experiment, list[MisplacedError]]:
+    """The experiment with the ``settings`` of a cell, and what is left out of it: those of other kinds than its own."""
+    left_out: list[MisplacedError] = []
+    while True:
+        names = [error.setting for error in left_out]
+        try:
+            return load_experiment(base, nested((n, value) for n, value in settings if n not in names)), left_out
+        except MisplacedError as error:
+            if error.setting in names or error.setting not in dict(settings):
+                raise
+            left_out.append(error)
+
+
+def _idle(grid: Grid, tasks: Mapping[tuple[int, ...], Task], place: tuple[int, ...], axis: int) -> bool:
+    """Whether all values of an axis make one task of a cell; vehicles that make the same are told apart."""
+    row = (tasks[*place[:axis], i, *place[axis + 1 :]] for i in range(len(grid.axes[axis].values)))
+    return grid.axes[axis].name != "vehicle.name" and len(set(row)) == 1
+
+
+def _refuse_idle(
+    grid: Grid, base: str, plan: Callable[[Experiment], list[Task]], tasks: Mapping[tuple[int, ...], Task]
+) -> None:
+    """Raise ``UsageError`` for a setting that changes nothing in any cell."""
+    alike = [axis.name for a, axis in enumerate(grid.axes) if all(_idle(grid, tasks, place, a) for place in tasks)]
+    for name in [*alike, *dict(grid.fixed)]:
+        reason = None
+        for place, settings in grid.cells():
+            experiment, left_out = _experiment(base, settings)
+            if name not in [error.setting for error in left_out]:
+                reason = why_idle(name, experiment, plan, [tasks[place]])
+                if reason is None:
+                    break
+        if reason is not None:
+            raise UsageError(f"{name} changes nothing here: {reason}")
 
 
 def sweep(grid: Grid, chosen: Sequence[Cell]) -> Task:

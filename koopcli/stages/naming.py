@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
+from koopcli.checks import written
 from koopcli.config.changes import flat
 from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Series
-from koopcli.config.plants import used_of
-from koopcli.config.sampled import INPUTS
-from koopcli.config.samples import BoxSample, PointSample
-from koopcli.config.settings import PAIRS, FitEigen
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.eigen.rates import lattice_size
+from koopcli.koopman.eigen.fit import FitEigen
+from koopcli.simulation.samples.box import BoxSample
+from koopcli.simulation.samples.point import PointSample
+from koopcli.simulation.samples.sample import INPUTS
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 from koopcli.stages.makers import outlook
-from koopcli.vehicles.plants import PLANTS
+from koopcli.vehicles.plants.slips import Slips
 
 
 def names(predictors: Sequence[Task]) -> list[str]:
@@ -59,7 +58,7 @@ def differing(settings: Sequence[Mapping[str, Any]]) -> list[list[str]]:
 def settings_of(task: Task) -> Iterator[tuple[str, Any]]:
     """Every setting of a task and of what is behind it, by its full name."""
     for step in task.upstream():
-        yield from ((f"{step.stage}.{key}", value) for key, value in flat(asdict(step.settings)))
+        yield from ((f"{step.stage}.{key}", value) for key, value in flat(written(step.settings)))
 
 
 def _beside(evaluation: Task, moved: Sequence[str]) -> dict[str, Any]:
@@ -89,21 +88,21 @@ def _modes(evaluation: Task, experiment: Experiment) -> Series:
     fit = predictor.settings
     if not isinstance(fit, FitEigen):
         raise InvalidValueError("the figure takes evaluations of eigenfunctions, which have modes")
-    n_x = len(PLANTS[predictor.ancestor("simulate").settings.plant].states)
-    count = 2 * (fit.pairs or 0) + 2 if fit.eigenvalues in PAIRS else lattice_size(n_x, fit.degree)
-    return Series(fit.eigenvalues, float(count))
+    n_x = len(predictor.ancestor("simulate").settings.plant.states)
+    return Series(fit.eigenvalues.kind, float(fit.eigenvalues.count(n_x)))
 
 
 def _seconds(evaluation: Task, experiment: Experiment) -> Series:
     predictor = evaluation.input("predictor")
     simulation = predictor.ancestor("simulate")
     sample, steps = simulation.ancestor("sample").settings, simulation.settings
-    shown = {name: used_of(there.vehicle, "slips") for name, there in recipes.vehicles(experiment)}
+    shown = {name: Slips.used(there.vehicle) for name, there in recipes.vehicles(experiment)}
     vehicle = next((f"{name}: " for name, one in shown.items() if one == steps.vehicle), "")
     fit, about = predictor.settings, outlook(predictor).name
     if isinstance(fit, FitEigen):
-        parts = [fit.eigenvalues, fit.lift, *(["world"] if fit.coordinates == "world" else [])]
-        parts += ["continued"] if fit.rounds else []
+        parts = [fit.eigenvalues.kind, fit.lift.kind]
+        parts += ["world"] if getattr(fit.window, "coordinates", "") == "world" else []
+        parts += ["continued"] if fit.window.rounds else []
         about = ", ".join([sample.kind, *parts, *(f"{mirror} images" for mirror in fit.mirror)])
     return Series(f"{vehicle}{about}", sample.trajectories * steps.steps * steps.dt)
 

@@ -7,52 +7,58 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
-from koopcli.checks import build
+from koopcli.checks import restored
 from koopcli.config.experiment import Experiment, load_experiment
 from koopcli.config.pictures import Tyres
-from koopcli.config.sampled import Kind
-from koopcli.config.samples import CUSTOMS, SAMPLED_FOR, GreedySample, GridSample, SampleSettings
-from koopcli.config.settings import OF_BASIS, Baseline, BaselineKind, Eigenvalues, FitEdmd, FitEigen, FitName, Simulate
+from koopcli.config.settings import Baseline, BaselineKind, FitName, Simulate
 from koopcli.errors import InvalidValueError
+from koopcli.koopman.edmd.fit import FitEdmd
+from koopcli.koopman.eigen.fit import FitEigen
+from koopcli.koopman.eigen.windows import AlongTrajectory
 from koopcli.records import Meta
+from koopcli.simulation.samples.greedy import GreedySample
+from koopcli.simulation.samples.grid import GridSample
+from koopcli.simulation.samples.point import PointSample
+from koopcli.simulation.samples.sample import SampleChoice
 from koopcli.stages.base import Task
 from koopcli.stages.makers import MAKERS
 from koopcli.stages.usable import as_inputs
 from koopcli.vehicles.handling import tyres_of, wheel_loads
 from koopcli.vehicles.parameters import TYRES
+from koopcli.vehicles.plants import PLANTS
 
 FITS = tuple(MAKERS)
-BESIDE = (FitEdmd(basis="states"), FitEdmd(order=3), FitEdmd(order=5))  # EDMD of any trajectories, for comparison
+BESIDE = (
+    FitEdmd.of(basis="states"),
+    FitEdmd.of(order=3),
+    FitEdmd.of(order=5),
+)  # EDMD of any trajectories, for comparison
 OF_TYRES = ("m", "l_f", "l_r", "mu_scale", *TYRES)  # parameters that tyre forces depend on
 
 
-def sample(settings: SampleSettings) -> Task:
+def sample(settings: SampleChoice) -> Task:
     """The sample of ``settings``."""
     return Task("sample", settings.settled())
 
 
 def simulation(experiment: Experiment, of: Task | None = None, plant: str = "forces") -> Task:
     """Training trajectories, from the experiment's sample for its plant (else ``plant``) or from the one given."""
-    given = experiment.simulate.plant
-    start = of or sample(experiment.sample(CUSTOMS[given or plant].training))
-    settings = replace(
-        experiment.simulate,
-        plant=given or SAMPLED_FOR[start.settings.kind],
-        steps=experiment.simulate.steps or start.settings.horizon,
-    )
-    return Task("simulate", settings.settled(), (("sample", start),))
+    usual = type(experiment.simulate.plant or experiment.plant_for(PLANTS[plant]))
+    start = of or sample(experiment.sample(usual.training))
+    driven = experiment.simulate.plant or experiment.plant_for(start.settings.meant_for)
+    return Task("simulate", experiment.simulate.settled(driven, start.settings.horizon), (("sample", start),))
 
 
 def fit_edmd(experiment: Experiment, *of: Task) -> Task:
     """The EDMD predictor, from the experiment's training set or the trajectories given."""
     trajectories = of or (simulation(experiment, plant="forces"),)
-    return Task("fit-edmd", experiment.fit_edmd.settled(), as_inputs(trajectories))
+    return Task("fit-edmd", experiment.fit_edmd, as_inputs(trajectories))
 
 
 def fit_eigen(experiment: Experiment, of: Task | None = None) -> Task:
     """The eigenfunction predictor, from the experiment's training set or the trajectories given."""
     trajectories = of or simulation(experiment, plant="slips")
-    return Task("fit-eigen", experiment.fit_eigen.settled(), (("trajectories", trajectories),))
+    return Task("fit-eigen", experiment.fit_eigen, (("trajectories", trajectories),))
 
 
 def baseline(experiment: Experiment, of: Task | None = None) -> Task:
@@ -83,9 +89,9 @@ def test_set(experiment: Experiment, plant: Simulate, **changed: object) -> Task
     ``changed``: settings of the test sample to replace.
     """
     assert plant.plant is not None, "settled when it was simulated"
-    kind: Kind = CUSTOMS[plant.plant].test
-    if experiment.evaluate.restart is not None and SAMPLED_FOR["point"] == plant.plant:
-        kind = "point"
+    kind = plant.plant.test
+    if experiment.evaluate.restart is not None and isinstance(plant.plant, PointSample.meant_for):
+        kind = PointSample.kind
     there = replace(experiment, simulate=replace(experiment.simulate, dt=plant.dt))
     settings = replace(there.test(kind, plant.vehicle), **changed)  # type: ignore[arg-type]
     return Task("simulate", replace(plant, steps=settings.horizon), (("sample", sample(settings)),))
@@ -99,8 +105,9 @@ def driven(experiment: Experiment, plant: Simulate) -> Task:
 
 def remembered_simulation(about: Meta, dt: float) -> Simulate:
     """The simulation that a predictor remembers, for when its trajectories are no longer in the store."""
-    found: Simulate = build(Simulate, {**about, "dt": dt})
-    return found.settled()
+    known = restored(Simulate, {**about, "dt": dt})
+    assert known.plant is not None, "remembered"
+    return known.settled(known.plant, 1)
 
 
 def evaluation(experiment: Experiment, of: Task | None = None, on: Task | None = None) -> Task:
@@ -111,20 +118,21 @@ def evaluation(experiment: Experiment, of: Task | None = None, on: Task | None =
     trajectories = on or test_set(experiment, scored.ancestor("simulate").settings)
     first = experiment.evaluate.first
     if first is None:
-        first = CUSTOMS[trajectories.settings.plant].first
+        first = trajectories.settings.plant.first
     settings = replace(experiment.evaluate, first=first)
     return Task("evaluate", settings, (("predictor", scored), ("trajectories", trajectories)))
 
 
 def with_order(experiment: Experiment, order: int) -> Experiment:
     """The experiment with another basis order."""
-    return replace(experiment, fit_edmd=replace(experiment.fit_edmd, order=order))
+    return replace(experiment, fit_edmd=experiment.fit_edmd.but(order=order))
 
 
 def order_sweep(experiment: Experiment) -> list[Task]:
     """One evaluation for each order of the experiment's sweep. Raises ``InvalidValueError`` for a basis without any."""
-    if "order" not in OF_BASIS[experiment.fit_edmd.basis]:
-        raise InvalidValueError(f"the basis '{experiment.fit_edmd.basis}' has no order to sweep: choose polynomials")
+    basis = experiment.fit_edmd.basis
+    if not hasattr(basis, "order"):
+        raise InvalidValueError(f"the basis '{basis.kind}' has no order to sweep: choose polynomials")
     fits = (fit_edmd(with_order(experiment, order)) for order in experiment.reproduce.orders)
     return [evaluation(experiment, fit) for fit in fits]
 
@@ -147,18 +155,17 @@ DEGREES = (1, 2, 3)  # of the lattice, where modes are swept
 
 def mode_fits(fit: FitEigen, pairs: Sequence[int]) -> list[FitEigen]:
     """The fit with every number of rates of every kind: the lattice by its degree, the others by their ``pairs``."""
-    kinds: tuple[Eigenvalues, ...] = ("comb", "varpro")
     return [
-        *(replace(fit, eigenvalues="dmd", degree=degree) for degree in DEGREES),
-        *(replace(fit, eigenvalues=kind, pairs=count) for kind in kinds for count in pairs),
+        *(fit.but(eigenvalues="dmd", degree=degree) for degree in DEGREES),
+        *(fit.but(eigenvalues=kind, pairs=count) for kind in ("comb", "varpro") for count in pairs),
     ]
 
 
 def mode_sweep(experiment: Experiment) -> list[Task]:
     """One evaluation for each number of rates, of every kind; the best boundary values unless windows are fitted."""
     fit = experiment.fit_eigen
-    if fit.window != "horizon":
-        fit = replace(fit, boundary="optimal")
+    if isinstance(fit.window, AlongTrajectory):
+        fit = fit.but(boundary="optimal")
     fits = mode_fits(fit, experiment.reproduce.pairs)
     return [evaluation(experiment, fit_eigen(replace(experiment, fit_eigen=one))) for one in fits]
 
@@ -174,7 +181,7 @@ def best_eigen(there: Experiment, budget: float | None = None) -> Experiment:
 def improved(experiment: Experiment) -> list[Task]:
     """The paper's reading with the best boundary values, and the best predictor."""
     paper = replace(
-        experiment, fit_eigen=FitEigen(boundary="optimal", cut=1e-10, tabulate=experiment.fit_eigen.tabulate)
+        experiment, fit_eigen=FitEigen.of(boundary="optimal", cut=1e-10, tabulate=experiment.fit_eigen.tabulate)
     )
     return [fit_eigen(paper, simulation(paper, plant="slips")), fit_eigen(best_eigen(experiment))]
 

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 
-from koopcli.checks import build
-from koopcli.config.driving import ManoeuvreSample
-from koopcli.config.samples import SAMPLED_FOR
+from koopcli.checks import restored, written
 from koopcli.config.settings import Simulate
 from koopcli.errors import InvalidValueError
 from koopcli.progress import Progress
 from koopcli.records import ENDS, Course, Meta, Packed, Sample, Trajectories, join
 from koopcli.simulation.integrate import STIFF, integrate
 from koopcli.simulation.reference import reference
+from koopcli.simulation.samples.manoeuvre import ManoeuvreSample
+from koopcli.simulation.samples.sample import SampleChoice
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
-from koopcli.vehicles.options import OPTIONS, Options
-from koopcli.vehicles.plants import PLANTS, Plant
+from koopcli.vehicles.plants.plant import Plant
 
-SECONDS_A_STEP = {"forces": 3e-7, "slips": 1e-5, "wheels": 3e-5}
 A_STEP = 3e-4  # seconds for one step of a chunk, however few its trajectories are
 REFERENCE_STEP = 3e-3
 COURSE_BYTES = 24.0  # held of every trajectory; states and inputs are on disk, but for a chunk of them
@@ -43,8 +41,9 @@ def _chunk(settings: Simulate, inputs: Inputs, rows: slice, progress: Progress) 
         x, course = reference(plant.rhs, x0, u, settings.dt, progress)
     else:
         x, course = integrate(plant.rhs, x0, u, settings.dt, progress, plant.fastest_rate)
-    about = {name: getattr(settings, name) for name in ("plant", *OPTIONS)}
-    about["vehicle"] = asdict(settings.vehicle)
+    assert settings.plant is not None, "settled from the sample"
+    own = written(settings.plant)
+    about = {"plant": own.pop("kind"), **own, "vehicle": written(settings.vehicle)}
     return Trajectories(x, u, settings.dt, plant.states, plant.inputs, None, about, course).pack()
 
 
@@ -102,17 +101,16 @@ def _describe(figures: Meta, settings: Simulate) -> str:
 
 def _plant(settings: Simulate) -> Plant:
     assert settings.plant is not None, "settled from the sample"
-    options = Options(**{name: getattr(settings, name) for name in OPTIONS})
-    return PLANTS[settings.plant].configured(settings.vehicle, options)
+    return settings.plant.of(settings.vehicle)
 
 
 def _check(task: Task) -> None:
     sample, steps, plant = task.ancestor("sample").settings, task.settings.steps, task.settings.plant
-    meant = SAMPLED_FOR[sample.kind]
-    if PLANTS[plant].inputs != PLANTS[meant].inputs:
-        kinds = [kind for kind, name in SAMPLED_FOR.items() if name == plant]
+    meant = sample.meant_for
+    if plant.inputs != meant.inputs:
+        kinds = [name for name, kind in SampleChoice.kinds().items() if isinstance(plant, kind.meant_for)]
         raise InvalidValueError(
-            f"a sample of kind '{sample.kind}' holds the inputs of the plant '{meant}', not of '{plant}': "
+            f"a sample of kind '{sample.kind}' holds the inputs of the plant '{meant.kind}', not of '{plant.kind}': "
             f"use a sample of kind {' or '.join(kinds)}"
         )
     _plant(task.settings)
@@ -133,8 +131,8 @@ def _check(task: Task) -> None:
 
 def _estimate(task: Task) -> Cost:
     n, steps = task.ancestor("sample").settings.trajectories, task.settings.steps
-    each = SECONDS_A_STEP[task.settings.plant]
-    if each > SECONDS_A_STEP["forces"]:
+    each = task.settings.plant.a_sample
+    if task.settings.plant.stiff:
         each *= max(1.0, task.settings.dt / 0.01)  # stiff: a longer step is walked through in more
     if task.settings.reference:
         each = REFERENCE_STEP
@@ -146,14 +144,14 @@ def _row_bytes(settings: Simulate) -> float:
     """Bytes of one trajectory."""
     assert settings.plant is not None, "settled from the sample"
     assert settings.steps is not None, "settled from the sample"
-    plant = PLANTS[settings.plant]
-    return 8.0 * (len(plant.states) * (settings.steps + 1) + len(plant.inputs) * settings.steps + 3)
+    states, inputs = settings.plant.states, settings.plant.inputs
+    return 8.0 * (len(states) * (settings.steps + 1) + len(inputs) * settings.steps + 3)
 
 
 STAGE = Stage(
     name="simulate",
-    version=3,
-    settings=lambda values: build(Simulate, values),
+    version=4,
+    settings=lambda values: restored(Simulate, values),
     run=_run,
     unpack=Trajectories.unpack,
     figures=_figures,

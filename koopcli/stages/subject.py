@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
+from koopcli.checks import taken
 from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Subject
-from koopcli.config.samples import OF_VEHICLE
 from koopcli.config.settings import Simulate
-from koopcli.config.shipped import Fingerprint, fingerprint, used_by
+from koopcli.config.shipped import Fingerprint, fingerprint
 from koopcli.errors import UnknownNameError
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
@@ -43,12 +43,13 @@ def _simulations(
             except UnknownNameError:  # its record is gone too
                 continue
     for settings in known:
-        yield fingerprint(settings.vehicle, used_by(settings.plant))
+        yield fingerprint(settings.vehicle, settings.plant.uses())
 
 
 def _samples(steps: Sequence[Task]) -> Iterator[Fingerprint]:
     """What samples hold of a vehicle where nothing was simulated."""
     for step in steps:
-        names = tuple(name for name in OF_VEHICLE if hasattr(step.settings, name))
-        if step.stage == "sample" and names:
+        if step.stage == "sample" and hasattr(step.settings, "vehicle"):
+            yield fingerprint(step.settings.vehicle, step.settings.meant_for.uses())
+        elif step.stage == "sample" and (names := tuple(taken(type(step.settings)))):
             yield fingerprint(step.settings, names)

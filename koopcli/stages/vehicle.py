@@ -7,9 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
 
+from koopcli.checks import taken
 from koopcli.config.experiment import Experiment
-from koopcli.config.plants import UNUSED
-from koopcli.config.samples import OF_VEHICLE, SAMPLED_FOR
 from koopcli.simulation.portrait import measures, odd
 from koopcli.stages.base import Task
 from koopcli.vehicles.parameters import VehicleParameters
@@ -41,7 +40,7 @@ def makes_the_same(experiment: Experiment, tasks: Sequence[Task]) -> str | None:
         return f"{names} have the same parameters: what is made is the same"
     if any(name in _used(step) for step in steps for name in differing):
         return None
-    plants = sorted({f"the plant '{step.settings.plant}'" for step in steps if step.stage == "simulate"})
+    plants = sorted({f"the plant '{step.settings.plant.kind}'" for step in steps if step.stage == "simulate"})
     users = plants or sorted({f"a sample of kind '{step.settings.kind}'" for step in steps})
     return f"{names} differ only in {', '.join(differing)}, which {users[0]} does not use: what is made is the same"
 
@@ -50,6 +49,6 @@ def _used(step: Task) -> set[str]:
     """The parameters of the vehicle that a sample or a simulation depends on."""
     settings = step.settings
     if not hasattr(settings, "vehicle"):
-        return {name for name in OF_VEHICLE if hasattr(settings, name)}
-    plant = settings.plant if step.stage == "simulate" else SAMPLED_FOR[settings.kind]
-    return set(NAMES) - {name.removeprefix("vehicle.") for name in UNUSED[plant]}
+        return set(taken(type(settings)))
+    plant = settings.plant if step.stage == "simulate" else settings.meant_for
+    return set(plant.uses())

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from koopcli.config.experiment import Experiment
-from koopcli.config.settings import Baseline, FitEdmd
+from koopcli.config.settings import Baseline
+from koopcli.koopman.edmd.fit import FitEdmd
 from koopcli.records import Meta
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
@@ -17,7 +18,7 @@ from koopcli.stages.makers import LIFTED
 from koopcli.stages.usable import roles_of
 from koopcli.store import Record, Store
 
-LINEAR = FitEdmd(basis="total", order=1)
+LINEAR = FitEdmd.of(basis="total", order=1)
 USELESS = 50.0  # percent of a trajectory's size
 NAMES = {
     "hold": "hold the first state",

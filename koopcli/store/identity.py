@@ -6,12 +6,13 @@ import hashlib
 import json
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, is_dataclass
+from dataclasses import is_dataclass
 from typing import Any
 
 import numpy as np
 
 from koopcli.blocks import Blocks
+from koopcli.checks import written
 from koopcli.errors import InvalidValueError
 from koopcli.records import Packed
 
@@ -22,7 +23,7 @@ SLAB = 1 << 24  # bytes hashed or written at a time
 def plain(value: Any) -> Any:
     """Settings as JSON values that people can read; floats keep every digit."""
     if is_dataclass(value) and not isinstance(value, type):
-        return plain(asdict(value))
+        return plain(written(value))
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -14,20 +15,22 @@ from koopcli.vehicles.handling import G, tyres_of, wheel_loads
 from koopcli.vehicles.parameters import VehicleParameters
 from koopcli.vehicles.tyre import Coefficients
 
-COMBINED = ("none", "ellipse")
+Combined = Literal["none", "ellipse"]
+V_EPS_HELP = "a wheel slower than this counts as that fast in its slips"
+COMBINED_HELP = "how forces along and across a wheel share its grip"
 
 
 @dataclass(frozen=True)
 class Axles:
     """The tyre forces of a vehicle; every array has the front and the rear axle on its last axis.
 
-    ``v_eps`` in m/s: a wheel slower than this counts as that fast in its slips; ``combined``: one of ``COMBINED``.
+    ``v_eps`` in m/s: a wheel slower than this counts as that fast in its slips; ``combined``: one of ``Combined``.
     A tyre with a shift is that of a left wheel, and the right wheel has its mirror image.
     """
 
     parameters: VehicleParameters
     v_eps: float
-    combined: str
+    combined: Combined
 
     @cached_property
     def arms(self) -> FloatArray:

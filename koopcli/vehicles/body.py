@@ -29,3 +29,8 @@ def derivative(p: VehicleParameters, x: FloatArray, F_x: FloatArray, F_y: FloatA
     out[..., 1] = (front + rear - drag * v_y) / p.m - yaw_rate * v_x
     out[..., 2] = (p.l_f * front - p.l_r * rear) / p.Jzz
     return out
+
+
+def like(x: FloatArray, u: FloatArray) -> FloatArray:
+    """An array for the derivative of ``x`` under ``u``."""
+    return np.empty((*np.broadcast_shapes(x.shape[:-1], u.shape[:-1]), x.shape[-1]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
@@ -10,13 +11,15 @@ from koopcli.errors import InvalidValueError
 from koopcli.records import FloatArray
 from koopcli.vehicles.parameters import VehicleParameters
 
-MIRRORS: dict[str, dict[str, float]] = {
+Mirror = Literal["left-right", "front-rear"]
+
+MIRRORS: dict[Mirror, dict[str, float]] = {
     "left-right": {"v_x": 1.0, "v_y": -1.0, "yaw_rate": -1.0, "wheel_rate_f": 1.0, "wheel_rate_r": 1.0},
     "front-rear": {"v_x": -1.0, "v_y": 1.0, "yaw_rate": -1.0},
 }  # signs of states; without inputs, f(S x) = S f(x) (6.6)
 
 
-def signs(name: str, p: VehicleParameters, states: Sequence[str]) -> FloatArray:
+def signs(name: Mirror, p: VehicleParameters, states: Sequence[str]) -> FloatArray:
     """The signs (n_x,) that the ``states`` of a vehicle change under the mirror ``name``.
 
     Raises ``InvalidValueError`` for a vehicle without that symmetry, and for states that change places under it.
@@ -35,7 +38,7 @@ def signs(name: str, p: VehicleParameters, states: Sequence[str]) -> FloatArray:
     return np.array([MIRRORS[name][state] for state in states])
 
 
-def images(names: tuple[str, ...], p: VehicleParameters, states: Sequence[str]) -> list[FloatArray]:
+def images(names: tuple[Mirror, ...], p: VehicleParameters, states: Sequence[str]) -> list[FloatArray]:
     """The signs of every image but the original, of mirrors and of their combinations.
 
     Raises ``InvalidValueError`` for a vehicle without one of the symmetries.

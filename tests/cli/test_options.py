@@ -11,8 +11,8 @@ import pytest
 from koopcli.checks import build
 from koopcli.cli import evaluating, fitting, invocation, making
 from koopcli.config.changes import flat
-from koopcli.config.settings import FitEigen
 from koopcli.errors import KoopError
+from koopcli.koopman.eigen.fit import FitEigen
 
 COMMANDS = (
     making.sample,

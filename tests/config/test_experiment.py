@@ -5,29 +5,32 @@ from dataclasses import asdict, fields, replace
 from typing import get_args, get_type_hints
 
 import pytest
+from koopcli.vehicles.options import CUSTOMARY
+from koopcli.vehicles.single_track import WHEELS_PER_FORCE
 
 from koopcli.config import driving, pictures, plants, sampled, samples, settings
 from koopcli.config.changes import SECTIONS, parse_set, toml_value
 from koopcli.config.data import data_folder
 from koopcli.config.experiment import load_experiment
 from koopcli.config.pictures import PlotOptions
-from koopcli.config.samples import SAMPLES, BoxSample, GridSample
-from koopcli.config.settings import About, Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
+from koopcli.config.settings import About, Baseline, Evaluate, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError, UsageError
 from koopcli.figures.registry import FIGURES
 from koopcli.koopman.bases import BASES
 from koopcli.koopman.bases.thin_plate import PLACEMENTS
+from koopcli.koopman.edmd.fit import FitEdmd
+from koopcli.koopman.eigen.fit import FitEigen
 from koopcli.koopman.eigen.frames import FRAMES
 from koopcli.koopman.eigen.lookup import LOOKUPS
 from koopcli.koopman.eigen.rates import RATES
 from koopcli.koopman.scores.baselines import FORECASTS
 from koopcli.simulation.manoeuvres import MANOEUVRES
+from koopcli.simulation.samples.box import BoxSample
+from koopcli.simulation.samples.grid import GridSample
 from koopcli.simulation.sampling import DRAWS, MESHES
 from koopcli.stages.makers import LIFTED
 from koopcli.vehicles.axles import COMBINED
-from koopcli.vehicles.options import CUSTOMARY
 from koopcli.vehicles.plants import PLANTS
-from koopcli.vehicles.single_track import WHEELS_PER_FORCE
 from koopcli.vehicles.symmetry import MIRRORS
 
 PAPER = tomllib.loads((data_folder() / "experiments" / "paper.toml").read_text())
@@ -175,8 +178,8 @@ def test_what_a_plant_does_not_use_is_not_in_its_key():
     slips = Simulate(vehicle=vehicle, plant="slips", force_per="wheel")
     assert slips.settled() == Simulate(vehicle=vehicle, plant="slips").settled()
     assert slips.settled().vehicle.lateral == vehicle.lateral
-    assert FitEigen(boundary="optimal", centres=5, seed=3).settled() == FitEigen(boundary="optimal").settled()
-    assert FitEigen().settled() == FitEigen(cut=1e-14)
+    assert FitEigen.of(boundary="optimal", centres=5, seed=3).settled() == FitEigen.of(boundary="optimal").settled()
+    assert FitEigen().settled() == FitEigen.of(cut=1e-14)
 
 
 def test_values_are_toml_or_plain_text():

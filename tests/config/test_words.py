@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from koopcli.config.plants import used_of
 
 from koopcli.config.changes import parse_set
 from koopcli.config.experiment import load_experiment, vehicle_named
-from koopcli.config.plants import used_of
-from koopcli.config.samples import EllipsoidSample, GridSample
 from koopcli.config.settings import Simulate
 from koopcli.config.words import plant_words, sample_words, vehicle_words
+from koopcli.simulation.samples.ellipsoid import EllipsoidSample
+from koopcli.simulation.samples.grid import GridSample
 from koopcli.vehicles.parameters import VehicleParameters
 
 CTU, RIMAC, BMW = (vehicle_named(name) for name in ("ctu-2020", "rimac-2018", "bmw-320i"))

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from koopcli.vehicles.single_track import SlipInput
 from matplotlib.colors import to_rgb
 
 from koopcli.errors import InvalidValueError
@@ -27,7 +28,6 @@ from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.scores.evaluation import evaluate
 from koopcli.records import Sample
 from koopcli.simulation import sampling
-from koopcli.vehicles.single_track import SlipInput
 from tests.conftest import ball_of, eigen_fit, surface_of, trajectories_of
 from tests.stages.toys import figure_settings
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from koopcli.vehicles.single_track import SlipInput, TorqueInput
 
 from koopcli.config.pictures import Cone
 from koopcli.figures import single_track, trajectory, tyre
@@ -13,7 +14,6 @@ from koopcli.figures.drawing import Source
 from koopcli.records import Trajectories
 from koopcli.simulation.manoeuvres import MANOEUVRES, OFFSET
 from koopcli.vehicles.handling import wheel_loads
-from koopcli.vehicles.single_track import SlipInput, TorqueInput
 from tests.stages.toys import CAR, figure_settings
 
 

@@ -7,8 +7,12 @@ from dataclasses import replace
 import pytest
 
 from koopcli.config.experiment import load_experiment
-from koopcli.config.samples import DriveSample, EllipsoidSample, GreedySample, GridSample
-from koopcli.config.settings import FitEdmd, FitEigen
+from koopcli.koopman.edmd.fit import FitEdmd
+from koopcli.koopman.eigen.fit import FitEigen
+from koopcli.simulation.samples.drive import DriveSample
+from koopcli.simulation.samples.ellipsoid import EllipsoidSample
+from koopcli.simulation.samples.greedy import GreedySample
+from koopcli.simulation.samples.grid import GridSample
 from koopcli.stages.advice import Case, advise
 
 BEST_EDMD = load_experiment("best-edmd", {}).fit_edmd.settled()
@@ -16,7 +20,7 @@ BEST_EIGEN = load_experiment("best-eigen", {})
 SURFACE = EllipsoidSample(m=1.0, Jzz=1.0)
 FORCES = Case("forces", FitEdmd(), GridSample(), trained=True, tested=True)
 SLIPS = Case("slips", FitEigen().settled(), SURFACE, trained=False, tested=False)
-WHEELS = Case("wheels", FitEdmd(basis="total", order=1), DriveSample(r_w=0.3), trained=True, tested=True)
+WHEELS = Case("wheels", FitEdmd.of(basis="total", order=1), DriveSample(r_w=0.3), trained=True, tested=True)
 CONSTANT_B, NEAREST = "a constant B limits it", "leave the middle of the volume empty"
 
 
@@ -51,7 +55,7 @@ def test_what_does_better(case, why, experiment, changes):
     [
         (replace(FORCES, fit=BEST_EDMD), "docs/paper.md"),
         (replace(FORCES, fit=replace(BEST_EDMD, order=6), sample=GridSample(count=7)), "docs/paper.md"),
-        (replace(FORCES, fit=FitEdmd(order=10), sample=GridSample(draw="even"), tested=False), "docs/paper.md"),
+        (replace(FORCES, fit=FitEdmd.of(order=10), sample=GridSample(draw="even"), tested=False), "docs/paper.md"),
         (replace(FORCES, sample=GridSample(count=10), tested=False), "docs/paper.md"),  # too few values for order 10
         (
             replace(SLIPS, fit=BEST_EIGEN.fit_eigen.settled(), sample=BEST_EIGEN.sample("greedy")),

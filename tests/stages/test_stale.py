@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import pytest
 
 from koopcli.checks import build
-from koopcli.config.settings import FitEdmd
+from koopcli.koopman.edmd.fit import FitEdmd
 from koopcli.stages import stale as staleness
 from koopcli.stages.registry import STAGES
 from koopcli.store import Store

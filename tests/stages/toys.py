@@ -12,16 +12,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from koopcli.vehicles.single_track import ForceInput, SlipInput, TorqueInput
 
 from koopcli.checks import build
-from koopcli.config.driving import DriveSample, ManoeuvreSample
 from koopcli.config.pictures import Cone, Plot, Series, Subject, Tyres
-from koopcli.config.samples import BallSample, BoxSample, EllipsoidSample, GreedySample, GridSample, PointSample
-from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Simulate, Sweep, SweepAxis
+from koopcli.config.settings import Baseline, Evaluate, Simulate, Sweep, SweepAxis
 from koopcli.config.shipped import fingerprint, used_by
 from koopcli.figures.registry import FIGURES
 from koopcli.koopman.bases.orthonormal import OrthonormalPolynomials
 from koopcli.koopman.bases.polynomial import Polynomial
+from koopcli.koopman.edmd.fit import FitEdmd
+from koopcli.koopman.eigen.fit import FitEigen
 from koopcli.koopman.eigen.nodes import Search, nodes_of
 from koopcli.koopman.eigen.tabulated import Tabulated
 from koopcli.koopman.predictor.coverage import Coverage
@@ -38,10 +39,17 @@ from koopcli.koopman.scores.swept import SCORES, Swept
 from koopcli.progress import silent
 from koopcli.records import Meta, Packed, Sample, Trajectories
 from koopcli.simulation.manoeuvres import MANOEUVRES
+from koopcli.simulation.samples.ball import BallSample
+from koopcli.simulation.samples.box import BoxSample
+from koopcli.simulation.samples.drive import DriveSample
+from koopcli.simulation.samples.ellipsoid import EllipsoidSample
+from koopcli.simulation.samples.greedy import GreedySample
+from koopcli.simulation.samples.grid import GridSample
+from koopcli.simulation.samples.manoeuvre import ManoeuvreSample
+from koopcli.simulation.samples.point import PointSample
 from koopcli.stages.base import Context
 from koopcli.stages.registry import STAGES
 from koopcli.vehicles.parameters import MagicFormula, VehicleParameters
-from koopcli.vehicles.single_track import ForceInput, SlipInput, TorqueInput
 
 PINS = Path(__file__).parents[1] / "golden" / "stages.json"
 BEYOND = 1e12  # a condition number past this is rounding
@@ -304,22 +312,24 @@ TOYS = {
         (Simulate(vehicle=ON_WHEELS, plant="wheels", steps=3, reference=True).settled(), {"sample": _driven()}),
     ],
     "fit-edmd": [
-        (FitEdmd(order=2), {"trajectories": _trajectories(1)}),
-        (FitEdmd(order=2), {"trajectories": _trajectories(3)}),
-        (FitEdmd(order=1), {"trajectories": _flat()}),
-        (FitEdmd(basis="states"), {"trajectories": _gliding()}),
-        (FitEdmd(basis="anisotropic", order=2, terms="bilinear", ridge=1e-3), {"trajectories": _trajectories(1)}),
-        (FitEdmd(basis="total", order=2, terms="bilinear"), {"trajectories": _trajectories(3)}),
-        (FitEdmd(basis="thin-plate", centres=5, placement="drawn", seed=2), {"trajectories": _trajectories(1)}),
-        (FitEdmd(basis="total", order=1, terms="generator"), {"trajectories": _trajectories(1)}),
-        (FitEdmd(order=1, solver="cholesky-monomials"), {"trajectories": _trajectories(1)}),
+        (FitEdmd.of(order=2), {"trajectories": _trajectories(1)}),
+        (FitEdmd.of(order=2), {"trajectories": _trajectories(3)}),
+        (FitEdmd.of(order=1), {"trajectories": _flat()}),
+        (FitEdmd.of(basis="states"), {"trajectories": _gliding()}),
+        (FitEdmd.of(basis="anisotropic", order=2, terms="bilinear", ridge=1e-3), {"trajectories": _trajectories(1)}),
+        (FitEdmd.of(basis="total", order=2, terms="bilinear"), {"trajectories": _trajectories(3)}),
+        (FitEdmd.of(basis="thin-plate", centres=5, placement="drawn", seed=2), {"trajectories": _trajectories(1)}),
+        (FitEdmd.of(basis="total", order=1, terms="generator"), {"trajectories": _trajectories(1)}),
+        (FitEdmd.of(order=1, solver="cholesky-monomials"), {"trajectories": _trajectories(1)}),
     ],
     "fit-eigen": [
-        (FitEigen(centres=4, tabulate=0.05, cut=1e-6), {"trajectories": _gliding()}),
-        (FitEigen(centres=6, tabulate=0.05, cut=1e-6, scaling="extent", seed=3), {"trajectories": _gliding()}),
-        (FitEigen(boundary="optimal", degree=1, tabulate=0.04), {"trajectories": _gliding()}),
+        (FitEigen.of(centres=4, tabulate=0.05, cut=1e-6), {"trajectories": _gliding()}),
+        (FitEigen.of(centres=6, tabulate=0.05, cut=1e-6, scaling="extent", seed=3), {"trajectories": _gliding()}),
+        (FitEigen.of(boundary="optimal", degree=1, tabulate=0.04), {"trajectories": _gliding()}),
         (
-            FitEigen(boundary="optimal", eigenvalues="comb", pairs=1, cut=1e-8, tabulate=0.05, lift="linear", nodes=4),
+            FitEigen.of(
+                boundary="optimal", eigenvalues="comb", pairs=1, cut=1e-8, tabulate=0.05, lift="linear", nodes=4
+            ),
             {"trajectories": _gliding()},
         ),
         (

@@ -4,12 +4,12 @@ import json
 
 import numpy as np
 import pytest
+from koopcli.vehicles.options import Options
+from koopcli.vehicles.single_track import WHEELS_PER_FORCE, ForceInput, SlipInput
 
 from koopcli.errors import InvalidValueError
 from koopcli.simulation.integrate import simulate
-from koopcli.vehicles.options import Options
 from koopcli.vehicles.plants import PLANTS, remembered_plant
-from koopcli.vehicles.single_track import WHEELS_PER_FORCE, ForceInput, SlipInput
 from tests.conftest import ball_of, surface_of
 
 MIRROR_X = np.array([1, -1, -1])  # v_y and yaw rate change sign

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import product
 from math import comb
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
+from koopcli.checks import setting
 from koopcli.content import Content
+from koopcli.koopman.bases.basis import BasisChoice
 from koopcli.koopman.bases.moments import Products, products_of
 from koopcli.koopman.bases.orthonormal import Monomials, OrthonormalPolynomials, orthonormal_polynomials
 from koopcli.koopman.predictor.lifts import Observed
-from koopcli.records import Array, FloatArray, IndexArray, Packed
+from koopcli.records import Array, BoolArray, FloatArray, IndexArray, Packed
 
 
 class Axis(Protocol):
@@ -47,6 +49,8 @@ class Polynomial(Content):
 
     axes: tuple[Axis, ...]
     degrees: IndexArray
+
+    stored: ClassVar[str] = "polynomial"
 
     @property
     def constant(self) -> int:
@@ -132,7 +136,7 @@ class Polynomial(Content):
         arrays = {"degrees": Array(self.degrees, ("function", "state"), "1")}
         for i, axis in enumerate(self.axes):
             arrays |= {f"{i}/{name}": array for name, array in axis.pack().items()}
-        return Packed(arrays, {"kind": "polynomial"})
+        return Packed(arrays, {"kind": self.stored})
 
     @classmethod
     def unpack(cls, packed: Packed) -> Polynomial:
@@ -159,50 +163,102 @@ def _heads(leading: Sequence[FloatArray], degrees: IndexArray, one: FloatArray) 
     return head
 
 
-Highest = tuple[int, ...]  # the highest degree of each state
+@dataclass(frozen=True)
+class Polynomials(BasisChoice):
+    """Products of one polynomial for each state; the kinds differ in which products."""
+
+    makes = Polynomial
+
+    def belongs(self, degrees: IndexArray) -> BoolArray:
+        """Which products belong to the basis, (rows,), by their ``degrees`` (rows, n_x)."""
+        raise NotImplementedError
+
+    def make(self, x: FloatArray, *, raw: bool = False) -> Polynomial:
+        """The basis on the states ``x`` (n, n_x): factors orthonormal on their marginals, or ``raw`` monomials."""
+        highest = self.degrees(x.shape[1])
+        axes: Sequence[Axis]
+        if raw:
+            axes = [Monomials(degree) for degree in highest]
+        else:
+            axes = [orthonormal_polynomials(*_marginal(x[:, i]), degree) for i, degree in enumerate(highest)]
+        rows = np.array(list(product(*(range(degree + 1) for degree in highest))))
+        return Polynomial(tuple(axes), rows[self.belongs(rows)])
 
 
 @dataclass(frozen=True)
-class Family:
-    """Which products belong to a basis: ``highest(order, degree_velocity, states)`` degree of each state, whether a
-    row of ``degrees`` (rows, n_x) does, and how many do, for the same three numbers.
-    """
+class Tensor(Polynomials):
+    """Polynomials up to the order in each state."""
 
-    highest: Callable[[int, int, int], Highest]
-    belongs: Callable[[IndexArray, int, int], np.ndarray]
-    count: Callable[[int, int, int], int]
+    kind: ClassVar[str] = "tensor"
+    order: int = setting(7, low=1, high=1000, option=True, help="highest degree of each state")
 
+    @property
+    def name(self) -> str:
+        """What an EDMD predictor with it is called."""
+        return f"EDMD, order {self.order}"
 
-FAMILIES = {
-    "tensor": Family(
-        highest=lambda k, p, n: (k,) * n,
-        belongs=lambda degrees, k, p: np.full(len(degrees), True),
-        count=lambda k, p, n: (k + 1) ** n,
-    ),
-    "total": Family(
-        highest=lambda k, p, n: (k,) * n,
-        belongs=lambda degrees, k, p: degrees.sum(axis=1) <= k,
-        count=lambda k, p, n: comb(k + n, n),
-    ),
-    "anisotropic": Family(
-        highest=lambda k, p, n: (p,) * (n - 1) + (k,),
-        belongs=lambda degrees, k, p: degrees[:, :-1].sum(axis=1) <= p,
-        count=lambda k, p, n: comb(p + n - 1, n - 1) * (k + 1),
-    ),
-}
+    def degrees(self, states: int) -> tuple[int, ...]:
+        """The order, of each state."""
+        return (self.order,) * states
+
+    def belongs(self, degrees: IndexArray) -> BoolArray:
+        """All of them."""
+        return np.full(len(degrees), True)
+
+    def count(self, states: int) -> int:
+        """Number of observables of so many ``states``."""
+        return int((self.order + 1) ** states)
 
 
-def polynomial(x: FloatArray, family: str, order: int, degree_velocity: int, *, raw: bool = False) -> Polynomial:
-    """The basis of a ``family`` on the states ``x`` (n, n_x): factors orthonormal on their marginals, or ``raw``."""
-    chosen, n_x = FAMILIES[family], x.shape[1]
-    highest = chosen.highest(order, degree_velocity, n_x)
-    axes: Sequence[Axis]
-    if raw:
-        axes = [Monomials(degree) for degree in highest]
-    else:
-        axes = [orthonormal_polynomials(*_marginal(x[:, i]), degree) for i, degree in enumerate(highest)]
-    rows = np.array(list(product(*(range(degree + 1) for degree in highest))))
-    return Polynomial(tuple(axes), rows[chosen.belongs(rows, order, degree_velocity)])
+@dataclass(frozen=True)
+class Total(Polynomials):
+    """Polynomials up to the order in total."""
+
+    kind: ClassVar[str] = "total"
+    order: int = setting(7, low=1, high=1000, option=True, help="highest degree of a product")
+
+    @property
+    def name(self) -> str:
+        """What an EDMD predictor with it is called."""
+        return f"EDMD, total degree {self.order}"
+
+    def degrees(self, states: int) -> tuple[int, ...]:
+        """The order, of each state."""
+        return (self.order,) * states
+
+    def belongs(self, degrees: IndexArray) -> BoolArray:
+        """Those whose degrees add up to the order at most."""
+        return np.asarray(degrees.sum(axis=1) <= self.order)
+
+    def count(self, states: int) -> int:
+        """Number of observables of so many ``states``."""
+        return comb(self.order + states, states)
+
+
+@dataclass(frozen=True)
+class Anisotropic(Polynomials):
+    """Polynomials up to the order in the yaw rate and to another degree in the velocity."""
+
+    kind: ClassVar[str] = "anisotropic"
+    order: int = setting(7, low=1, high=1000, option=True, help="highest degree of the yaw rate")
+    degree_velocity: int = setting(1, low=0, high=1000, option=True, help="highest degree of v_x and v_y together")
+
+    @property
+    def name(self) -> str:
+        """What an EDMD predictor with it is called."""
+        return f"EDMD, degrees {self.degree_velocity} and {self.order}"
+
+    def degrees(self, states: int) -> tuple[int, ...]:
+        """That of the velocity, and the order of the last state."""
+        return (self.degree_velocity,) * (states - 1) + (self.order,)
+
+    def belongs(self, degrees: IndexArray) -> BoolArray:
+        """Those whose degrees of all states but the last do not add up to more."""
+        return np.asarray(degrees[:, :-1].sum(axis=1) <= self.degree_velocity)
+
+    def count(self, states: int) -> int:
+        """Number of observables of so many ``states``."""
+        return comb(self.degree_velocity + states - 1, states - 1) * (self.order + 1)
 
 
 def _marginal(values: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
+from koopcli.checks import SEED_LIMIT, setting
 from koopcli.content import Content
 from koopcli.errors import InvalidValueError
+from koopcli.koopman.bases.basis import BasisChoice
 from koopcli.koopman.predictor.lifts import Observed
 from koopcli.records import Array, FloatArray, Packed
 
@@ -58,6 +60,7 @@ class ThinPlate(Content):
     scale: FloatArray
     centres: FloatArray
 
+    stored: ClassVar[str] = "thin-plate"
     constant: ClassVar[int] = 0
     products: ClassVar[None] = None
 
@@ -104,7 +107,7 @@ class ThinPlate(Content):
             "scale": Array(self.scale, ("state",), like),
             "centres": Array(self.centres, ("centre", "state"), like),
         }
-        return Packed(arrays, {"kind": "thin-plate"})
+        return Packed(arrays, {"kind": self.stored})
 
     @classmethod
     def unpack(cls, packed: Packed) -> ThinPlate:
@@ -112,12 +115,36 @@ class ThinPlate(Content):
         return cls(**{name: array.values[...] for name, array in packed.arrays.items()})
 
 
-def thin_plate_basis(x: FloatArray, centres: int, placement: str, seed: int) -> ThinPlate:
-    """The basis on the training states ``x`` (n, n_x); distances are in half-widths of their box."""
-    low, high = x.min(axis=0), x.max(axis=0)
-    half = (high - low) / 2
-    scale = np.where(half > 0, half, 1.0)
-    middle = (high + low) / 2
-    distinct = np.unique(x, axis=0)
-    placed = PLACEMENTS[placement]((distinct - middle) / scale, centres, seed)
-    return ThinPlate(middle, scale, middle + scale * placed)
+@dataclass(frozen=True)
+class Splines(BasisChoice):
+    """Thin-plate splines, with a constant and the states."""
+
+    kind: ClassVar[str] = "thin-plate"
+    makes = ThinPlate
+    centres: int = setting(500, low=1, high=100_000, option=True, help="number of splines")
+    placement: Literal["k-means", "drawn"] = setting(
+        "k-means",
+        option=True,
+        help="centres at the means of clusters of the data, or drawn from a normal distribution with its mean and "
+        "spread",
+    )
+    seed: int = setting(0, low=0, high=SEED_LIMIT, help="seed of the centres")
+
+    @property
+    def name(self) -> str:
+        """What an EDMD predictor with it is called."""
+        return f"EDMD, {self.centres} splines"
+
+    def count(self, states: int) -> int:
+        """Number of observables of so many ``states``."""
+        return 1 + states + self.centres
+
+    def make(self, x: FloatArray, *, raw: bool = False) -> ThinPlate:
+        """The basis on the training states ``x`` (n, n_x); distances are in half-widths of their box."""
+        low, high = x.min(axis=0), x.max(axis=0)
+        half = (high - low) / 2
+        scale = np.where(half > 0, half, 1.0)
+        middle = (high + low) / 2
+        distinct = np.unique(x, axis=0)
+        placed = PLACEMENTS[self.placement]((distinct - middle) / scale, self.centres, self.seed)
+        return ThinPlate(middle, scale, middle + scale * placed)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from koopcli.koopman.bases import Basis
+from koopcli.koopman.bases.basis import Basis
 from koopcli.koopman.edmd.inputs import white_inputs
 from koopcli.koopman.edmd.operators import Operators, operators
 from koopcli.koopman.edmd.passes import Over, Pass

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.bases import Basis
+from koopcli.koopman.bases.basis import Basis
 from koopcli.koopman.edmd.inputs import WhiteInputs
 from koopcli.koopman.edmd.regression import Solution, condition_number
 from koopcli.records import FloatArray

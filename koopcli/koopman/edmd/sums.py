@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from koopcli.koopman.bases import STORED, Basis
+from koopcli.koopman.bases import STORED
+from koopcli.koopman.bases.basis import Basis
 from koopcli.koopman.bases.moments import Products
 from koopcli.koopman.edmd.inputs import WhiteInputs
 from koopcli.koopman.edmd.passes import Found

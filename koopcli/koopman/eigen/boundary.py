@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 
+from koopcli.checks import SEED_LIMIT, Choice, setting
+from koopcli.koopman.bases.thin_plate import draw_centres, thin_plate
 from koopcli.koopman.predictor.modes import Modes, exponentials
 from koopcli.records import BoolArray, FloatArray
+
+CUT = "smallest singular value kept, relative to the largest, on which the errors depend; else working precision"
 
 
 @dataclass(frozen=True)
@@ -147,3 +152,56 @@ def _lengths(columns: FloatArray) -> FloatArray:
 def condition_of(singular: FloatArray) -> float:
     """The largest over the smallest of ``singular`` values."""
     return float(singular.max() / singular.min()) if singular.min() > 0 else math.inf
+
+
+class Boundary(Choice):
+    """Where the values of eigenfunctions on Γ come from. ``cut``: the smallest singular value kept, of the largest."""
+
+    cut: float | None
+
+    def copies(self, states: int, starts: int) -> int:
+        """Boundary functions of so many ``states`` on so many ``starts``."""
+        return states
+
+    def solve(self, x: FloatArray, modes: Modes) -> Solution:
+        """The boundary values and C for trajectories ``x`` (J, samples, n_x); ``modes`` has one copy here."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Splines(Boundary):
+    """Thin-plate splines of the state, as in the paper."""
+
+    kind: ClassVar[str] = "thin-plate"
+    centres: int = setting(441, low=1, high=100_000, option=True, help="number of splines")
+    seed: int = setting(0, low=0, high=SEED_LIMIT, help="seed of their centres")
+    scaling: Literal["raw", "extent"] = setting("raw", help="distances in raw SI units, or in half-widths of the data")
+    cut: float = setting(1e-14, low=0, high=0.5, option=True, help=CUT)
+
+    def copies(self, states: int, starts: int) -> int:
+        """As many as there are splines, and not more than they can be told apart by."""
+        return min(starts, self.centres)
+
+    def solve(self, x: FloatArray, modes: Modes) -> Solution:
+        """C by least squares with splines of the initial states."""
+        half = np.ptp(x, axis=(0, 1)) / 2
+        scale = np.where(half > 0, half, 1.0) if self.scaling == "extent" else np.ones(x.shape[2])
+        centres = draw_centres(x, self.centres, self.seed)
+        return fit_given(x, thin_plate(x[:, 0], centres, scale), modes, self.cut)
+
+
+@dataclass(frozen=True)
+class Optimal(Boundary):
+    """The best values for each trajectory."""
+
+    kind: ClassVar[str] = "optimal"
+    cut: float | None = setting(None, low=0, high=0.5, option=True, help=CUT)
+
+    def solve(self, x: FloatArray, modes: Modes) -> Solution:
+        """The best values, and C that reads states off."""
+        return fit_free(x, modes, kept(self.cut, x.shape[1]))
+
+
+def kept(cut: float | None, samples: int) -> float:
+    """The ``cut``, or working precision over so many ``samples``."""
+    return float(np.finfo(float).eps * samples) if cut is None else cut

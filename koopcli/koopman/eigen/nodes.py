@@ -7,9 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
+from koopcli.checks import restored, written
 from koopcli.content import Content
-from koopcli.koopman.eigen.lookup import LOOKUPS, Lookup, check_nodes, search
 from koopcli.koopman.eigen.lookup.cloud import Cloud
+from koopcli.koopman.eigen.lookup.lookup import Lift, Lookup, search
 from koopcli.koopman.predictor.places import placed
 from koopcli.records import Array, FloatArray, IndexArray, Meta, Packed
 
@@ -21,18 +22,13 @@ SMALLEST = 1e-4  # of a voxel, in units of place
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Search(Content):
-    """How nodes are looked up: ``kind`` of ``LOOKUPS``, with how many ``neighbours`` (None: as the kind has it) and
-    their ``spacing`` (see ``Cloud``), of how many ``nodes`` kept for each trajectory (None: all).
-
-    Distances are between the places of the states by ``scale`` and ``power`` (see ``placed``).
+    """How nodes are looked up: by a ``lift``, at distances between the places of states by ``scale`` and ``power`` (see
+    ``placed``).
     """
 
-    kind: str
+    lift: Lift
     scale: FloatArray
     power: float = 1.0
-    neighbours: int | None = None
-    nodes: int | None = None
-    spacing: int | None = None
 
     def place(self, x: FloatArray) -> FloatArray:
         """Where the states ``x`` (n, n_x) lie, (n, n_x), eq. (7.12)."""
@@ -70,9 +66,9 @@ class Nodes(Content):
 
     @cached_property
     def _lookup(self) -> Lookup:
-        how, places = self.search, self.search.place(self.states)
-        neighbours = check_nodes(how.kind, places, how.neighbours)
-        return LOOKUPS[how.kind].make(Cloud(places, self.trajectory, self.sample, neighbours, how.spacing))
+        lift, places = self.search.lift, self.search.place(self.states)
+        lift.check(places)
+        return lift.make(Cloud(places, self.trajectory, self.sample, lift.neighbours, lift.spacing))
 
     def pack(self) -> Packed:
         """The nodes for storage, by number: their states are with the trajectories."""
@@ -85,37 +81,29 @@ class Nodes(Content):
     @property
     def about(self) -> Meta:
         """How they are looked up, as JSON."""
-        s = self.search
-        return {
-            "kind": s.kind,
-            "power": s.power,
-            "neighbours": s.neighbours,
-            "nodes": s.nodes,
-            "spacing": s.spacing,
-            "samples": self.samples,
-        }
+        return {"lift": written(self.search.lift), "power": self.search.power, "samples": self.samples}
 
     @classmethod
     def unpack(cls, packed: Packed, trajectories: FloatArray) -> Nodes:
         """The inverse of :meth:`pack`, of ``trajectories`` (J, samples or more, n_x)."""
         meta = packed.meta
         scale, kept = packed.arrays["scale"].values[...], packed.arrays["nodes"].values[...]
-        how = Search(meta["kind"], scale, meta["power"], meta["neighbours"], meta["nodes"], meta["spacing"])
+        how = Search(restored(Lift, meta["lift"]), scale, meta["power"])
         j, k = np.divmod(kept, meta["samples"])
         return cls(how, trajectories[j, k], kept, meta["samples"])
 
 
-def nodes_of(x: FloatArray, samples: int, search: Search) -> Nodes:
-    """The nodes among the first ``samples`` samples of ``x`` (J, samples or more, n_x).
+def nodes_of(x: FloatArray, samples: int, search: Search, most: int | None = None) -> Nodes:
+    """The nodes among the first ``samples`` samples of ``x`` (J, samples or more, n_x), at ``most`` so many of each.
 
     Raises ``InvalidValueError`` where fewer are kept than the lookup needs, and where they lie in a plane.
     """
     states = x[:, :samples].reshape(-1, x.shape[2])
     kept = np.arange(len(states))
-    if search.nodes is not None:
+    if most is not None:
         late = kept % samples
-        kept = thinned(search.place(states), np.argsort(late, kind="stable"), search.nodes * len(x))
-    check_nodes(search.kind, search.place(states[kept]), search.neighbours)
+        kept = thinned(search.place(states), np.argsort(late, kind="stable"), most * len(x))
+    search.lift.check(search.place(states[kept]))
     return Nodes(search, states[kept], kept, samples)
 
 

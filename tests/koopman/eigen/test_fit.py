@@ -7,6 +7,7 @@ from pathlib import Path
 import mpmath as mp
 import numpy as np
 import pytest
+from koopcli.vehicles.single_track import SlipInput
 from scipy.linalg import expm
 
 from koopcli.config.data import locate
@@ -21,7 +22,6 @@ from koopcli.koopman.scores.baselines import FORECASTS, Forecast
 from koopcli.koopman.scores.evaluation import evaluate
 from koopcli.records import Channels, Trajectories
 from koopcli.vehicles.parameters import read_vehicle
-from koopcli.vehicles.single_track import SlipInput
 from tests.conftest import ball_of, eigen_fit, grid_sample, surface_of, trajectories_of
 
 REFERENCE = json.loads((Path(__file__).parents[2] / "golden" / "eigen_reference.json").read_text())

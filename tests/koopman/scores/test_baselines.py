@@ -4,10 +4,10 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from koopcli.vehicles.single_track import ForceInput
 
 from koopcli.koopman.predictor.coverage import coverage_of
 from koopcli.koopman.scores.baselines import FORECASTS, Forecast, _exponential
-from koopcli.vehicles.single_track import ForceInput
 from tests.conftest import ball_of, box_sample, trajectories_of
 
 

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from koopcli.vehicles.single_track import SlipInput
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.predictor.dynamics.bilinear import Bilinear
 from koopcli.koopman.scores.evaluation import Evaluation, evaluate, join
-from koopcli.vehicles.single_track import SlipInput
 from tests.conftest import ball_of, box_sample, eigen_fit, grid_sample, surface_of, trajectories_of
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.eigen.lookup.cloud import Cloud
+from koopcli.koopman.eigen.lookup.lookup import Lift
 from koopcli.records import BoolArray, FloatArray, IndexArray
 
 INSIDE = -1e-10  # smallest barycentric coordinate of a place that counts as inside
@@ -96,3 +100,15 @@ def _barycentric(corners: FloatArray, y: FloatArray) -> FloatArray:
             parts[:, i] = np.linalg.det(moved)
     first = parts / np.where(volume == 0, np.finfo(float).tiny, volume)[:, np.newaxis]
     return np.column_stack([first, 1 - first.sum(axis=1)])
+
+
+@dataclass(frozen=True)
+class LinearLift(Lift):
+    """Linear between samples (Delaunay)."""
+
+    kind: ClassVar[str] = "linear"
+    beyond = "take the nearest sample"
+
+    def make(self, nodes: Cloud) -> Linear:
+        """The lookup among ``nodes``."""
+        return Linear(nodes)

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 
+from koopcli.checks import setting
 from koopcli.koopman.eigen.lookup.cloud import Cloud
+from koopcli.koopman.eigen.lookup.lookup import Lift
 from koopcli.records import FloatArray, IndexArray
 
 WIDTH = 0.6  # of the Gaussian weights, over the distance to the farthest neighbour
@@ -43,3 +48,19 @@ def trend_weights(near: FloatArray) -> FloatArray:
     constant = np.zeros((*gram.shape[:2], 1))
     constant[:, 0] = 1.0
     return np.asarray(np.matmul(weighted, np.linalg.solve(gram, constant))[..., 0])
+
+
+@dataclass(frozen=True)
+class MlsLift(Lift):
+    """Moving least squares."""
+
+    kind: ClassVar[str] = "mls"
+    beyond = "continue the local linear function"
+    neighbours: int = setting(24, low=1, high=10_000, help="nodes at a time")
+    spacing: int | None = setting(
+        None, low=1, high=1_000_000, help="samples between neighbours on one trajectory; else any"
+    )
+
+    def make(self, nodes: Cloud) -> MovingLeastSquares:
+        """The lookup among ``nodes``."""
+        return MovingLeastSquares(nodes)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import combinations_with_replacement
+from typing import ClassVar
 
 import numpy as np
 
+from koopcli.checks import setting
 from koopcli.koopman.eigen.lookup.cloud import Cloud
+from koopcli.koopman.eigen.lookup.lookup import Lift
 from koopcli.koopman.eigen.lookup.mls import trend_weights
 from koopcli.records import BoolArray, FloatArray, IndexArray
 
@@ -90,3 +94,23 @@ def _monomials(near: FloatArray, degree: int) -> FloatArray:
         return np.stack(first, axis=2)
     pairs = combinations_with_replacement(range(near.shape[2]), 2)
     return np.stack([*first, *(near[:, :, i] * near[:, :, j] for i, j in pairs)], axis=2)
+
+
+@dataclass(frozen=True)
+class PolyharmonicLift(Lift):
+    """Local polyharmonic splines."""
+
+    kind: ClassVar[str] = "polyharmonic"
+    beyond = "continue the local spline, which bends there"
+    neighbours: int = setting(60, low=1, high=10_000, help="nodes at a time")
+    spacing: int | None = setting(
+        None, low=1, high=1_000_000, help="samples between neighbours on one trajectory; else any"
+    )
+
+    def make(self, nodes: Cloud) -> Polyharmonic:
+        """The lookup among ``nodes``."""
+        return Polyharmonic(nodes)
+
+    def fewest(self, states: int) -> int:
+        """As many as a quadratic has coefficients."""
+        return (states + 1) * (states + 2) // 2

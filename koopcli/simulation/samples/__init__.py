@@ -1,0 +1,7 @@
+"""Kinds of sample: initial states and inputs. A new kind is one file in this folder, with its settings."""
+
+from __future__ import annotations
+
+from koopcli.checks import import_files
+
+import_files(__name__, __path__)
