@@ -44,13 +44,12 @@ def simulated(store: Path, settings: list[str]) -> Any:
 
 def prepare(work: Path) -> None:
     """A folder for each dataset: koop's store, and the same samples and basis for whoever knows numpy alone."""
-    from koopcli.koopman.bases import Choice
     from koopcli.koopman.edmd import fit as edmd
 
     test = simulated(work / "test", TEST)
     for name, settings in DATASETS.items():
         data = simulated(work / name / "store", settings)
-        basis = edmd.basis_from_data(data, Choice("tensor", 7))
+        basis = edmd.FitEdmd.of(basis="tensor", order=7).basis_from(data)
         recurrences = {
             f"{key}{i}": a.values[...] for i, axis in enumerate(basis.axes) for key, a in axis.pack().items()
         }

@@ -15,7 +15,6 @@ import numpy as np
 import plain
 
 import koopcli
-from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.scores.evaluation import evaluate, join
 
@@ -30,7 +29,7 @@ def cpu() -> float:
 def fit_product(store: Path):
     data = koopcli.load("simulate", store)
     yield
-    basis = edmd.basis_from_data(data, Choice("tensor", ORDER))
+    basis = edmd.FitEdmd.of(basis="tensor", order=ORDER).basis_from(data)
     predictor = edmd.fit(data, basis)
     yield float(np.abs(predictor.dynamics.A).sum())
 
@@ -42,7 +41,7 @@ def fit_blocks(store: Path):
 
     data = replace(koopcli.load("simulate", store), product=None)
     yield
-    basis = edmd.basis_from_data(data, Choice("tensor", ORDER))
+    basis = edmd.FitEdmd.of(basis="tensor", order=ORDER).basis_from(data)
     predictor = edmd.fit(data, basis)
     yield float(np.abs(predictor.dynamics.A).sum())
 
@@ -64,8 +63,8 @@ def fit_bilinear_blocks(store: Path):
 
 
 def _bilinear(data):
-    basis = edmd.basis_from_data(data, Choice("anisotropic", 8))
-    return edmd.fit(data, basis, edmd.Method(bilinear=True))
+    basis = edmd.FitEdmd.of(basis="anisotropic", order=8).basis_from(data)
+    return edmd.fit(data, basis, edmd.FitEdmd.of(terms="bilinear"))
 
 
 def bilinear_prediction(store: Path):
@@ -96,7 +95,7 @@ def bilinear_loop(store: Path):
 
 def fit_plain(store: Path):
     data = koopcli.load("simulate", store)
-    basis = edmd.basis_from_data(data, Choice("tensor", ORDER))
+    basis = edmd.FitEdmd.of(basis="tensor", order=ORDER).basis_from(data)
     x, u = data.x[:], data.u[:]
     yield
     A, _ = plain.fit(x[:, 0], u[:, 0], x[:, 1], basis.lift)
@@ -139,7 +138,7 @@ def eigen_fit(store: Path):
 def eigen_dense(store: Path):
     """A tenth of the trajectories and splines as one dense least squares: a hundredth of the unknowns' cost."""
     from koopcli.koopman.bases.thin_plate import draw_centres, thin_plate
-    from koopcli.koopman.eigen.rates import dmd_rates, lattice
+    from koopcli.koopman.eigen.rates.dmd import dmd_rates, lattice
     from koopcli.koopman.predictor.modes import exponentials
 
     data = koopcli.load("simulate", store)
@@ -185,11 +184,11 @@ def _futures(nodes):
 def _looked_up(kind: str, nodes, queries):
     from scipy.sparse import csr_matrix
 
-    from koopcli.koopman.eigen.lookup import LOOKUPS
     from koopcli.koopman.eigen.lookup.cloud import Cloud
+    from koopcli.koopman.eigen.lookup.lookup import Lift
 
     numbers = np.arange(len(nodes))
-    found = LOOKUPS[kind].make(Cloud(nodes, numbers, numbers, LOOKUPS[kind].neighbours or 1))
+    found = Lift.kinds()[kind]().make(Cloud(nodes, numbers, numbers, Lift.kinds()[kind]().neighbours))
     found(queries[:1])
     values = _futures(nodes)
     yield

@@ -10,11 +10,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from koopcli.vehicles.single_track import ForceInput
 
 from koopcli.config.experiment import load_experiment
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.edmd.transitions import Transitions
 from koopcli.koopman.predictor.predictor import Predictor
@@ -24,6 +22,7 @@ from koopcli.simulation import sampling
 from koopcli.simulation.integrate import simulate
 from koopcli.simulation.samples.box import BoxSample
 from koopcli.simulation.samples.grid import GridSample
+from koopcli.vehicles.plants.forces import ForceInput
 
 ORDERS = (5, 6, 7, 8)
 EPS = float(np.finfo(float).eps)
@@ -53,7 +52,7 @@ def test_set(excitation: str) -> Trajectories:
 
 def triangle(data: Trajectories, order: int) -> tuple[FloatArray, FloatArray]:
     """V and Y of the regression on raw monomials and inputs, as many rows as columns."""
-    basis = edmd.basis_from_data(data, Choice("tensor", order, raw=True))
+    basis = edmd.FitEdmd.of(basis="tensor", order=order, solver="cholesky-monomials").basis_from(data)
     kept = np.empty((0, 2 * basis.functions + len(data.input_channels)))
     for x, u, x_next in Transitions.of(data).blocks(16384):
         rows = np.hstack([basis.lift(x), u, basis.lift(x_next)])
@@ -97,8 +96,8 @@ def main() -> None:
         print(f"{order:>5}  {name:<30} {f'{rank} of {columns}':>11}  {scores}", flush=True)
 
     for order in ORDERS:
-        good = edmd.fit(data, edmd.basis_from_data(data, Choice("tensor", order)))
-        raw = edmd.basis_from_data(data, Choice("tensor", order, raw=True))
+        good = edmd.fit(data, edmd.FitEdmd.of(basis="tensor", order=order).basis_from(data))
+        raw = edmd.FitEdmd.of(basis="tensor", order=order, solver="cholesky-monomials").basis_from(data)
         V, Y = triangle(data, order)
         N = raw.functions
         for name, solver in SOLVERS.items():
@@ -106,7 +105,7 @@ def main() -> None:
             found = replace(good, observables=raw, A=W[:N].T.copy(), B=W[N:].T.copy(), C=raw.state_map)
             line(order, name, rank, V.shape[1], found)
         try:
-            found = edmd.fit(data, raw, edmd.Method(cholesky=True))
+            found = edmd.fit(data, raw, edmd.FitEdmd.of(solver="cholesky-monomials"))
             line(order, "cholesky-monomials", found.rank, V.shape[1], found)
         except InvalidValueError as error:
             print(f"{order:>5}  {'cholesky-monomials':<30} {error}")

@@ -127,7 +127,7 @@ def taken(cls: type) -> dict[str, str]:
 @cache
 def choices(cls: type) -> dict[str, type[Choice]]:
     """The settings of a class that are choices, each with its base class."""
-    bare = {name: without_none(hint) for name, hint in _hints(cls).items()}  # type: ignore[arg-type]
+    bare = {name: without_none(hint) for name, hint in hints_of(cls).items()}  # type: ignore[arg-type]
     return {name: hint for name, hint in bare.items() if isinstance(hint, type) and issubclass(hint, Choice)}
 
 
@@ -175,7 +175,7 @@ def restored(cls: type[T], values: Mapping[str, Any]) -> T:
     rest = dict(values)
     if issubclass(cls, Choice):
         cls = cls.kinds()[rest.pop("kind")]
-    hints = _hints(cls)  # type: ignore[arg-type]
+    hints = hints_of(cls)  # type: ignore[arg-type]
     beside = {name: coerce(hints[name], rest.pop(name), name, {}, COMMAND_LINE) for name in taken(cls) if name in rest}
     return build_layers(cls, [Layer(rest)], beside=beside)
 
@@ -313,7 +313,7 @@ def _checked(cls: type, layers: Sequence[Layer], prefix: str) -> Values:
             continue
         for layer in layers:
             if f.name in layer.values:
-                value, hint = layer.values[f.name], _hints(cls)[f.name]  # type: ignore[arg-type]
+                value, hint = layer.values[f.name], hints_of(cls)[f.name]  # type: ignore[arg-type]
                 values[f.name] = coerce(hint, value, f"{prefix}{f.name}", f.metadata, layer.origin)
     return values
 
@@ -347,7 +347,7 @@ def _elsewhere(name: str, key: str, section: str) -> str:
 
 
 @cache
-def _hints(cls: type) -> dict[str, Any]:
+def hints_of(cls: Any) -> dict[str, Any]:
     """The types of the fields of ``cls``, worked out once: an experiment is built of thousands of settings."""
     return get_type_hints(cls)
 

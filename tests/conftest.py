@@ -12,13 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
-from koopcli.vehicles.single_track import ForceInput, SlipInput
 
 from koopcli.__main__ import main
 from koopcli.checks import COMMAND_LINE
 from koopcli.config.data import locate
 from koopcli.koopman.eigen import fit as eigenfunctions
-from koopcli.koopman.eigen.rates import Spectrum
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.records import Sample, Trajectories
 from koopcli.simulation import sampling
@@ -27,6 +25,8 @@ from koopcli.stages.registry import STAGES
 from koopcli.store import Store
 from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
 from koopcli.vehicles.plants import Plant
+from koopcli.vehicles.plants.forces import ForceInput
+from koopcli.vehicles.plants.slips import SlipInput
 from tests import stock
 
 settings.register_profile("any load", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -206,30 +206,24 @@ def trajectories_of(plant: Plant, sample: Sample, steps: int, dt: float = 0.01) 
     return Trajectories(x, u, dt, plant.states, plant.inputs, sample.product)
 
 
+TOLD = {
+    "kind": "eigenvalues",
+    "low": "lowest",
+    "high": "highest",
+    "tabulated": "tabulate",
+    "frame": "coordinates",
+    "power": "radial_power",
+}  # short names of settings in tests
+
+
 def eigen_fit(data: Trajectories, images: int = 1, **given) -> Predictor:
     """The eigenfunction predictor of ``data`` with the paper's reading but for what is ``given``."""
-    rates = {"kind": "dmd", "degree": 2, "pairs": 10, "low": 2.0, "high": 26.0, "damping": 1.0}
-    rates |= {name: given.pop(name) for name in tuple(given) if name in rates}
-    about = {
-        "window": "trajectory",
-        "boundary": "thin-plate",
-        "centres": 441,
-        "seed": 0,
-        "scaling": "raw",
-        "cut": None,
-        "tabulated": 100,
-        "lift": "nearest",
-        "frame": "state",
-        "power": 1.0,
-        "neighbours": None,
-        "nodes": None,
-        "spacing": None,
-        "rounds": 0,
-        "trust": False,
-        **given,
-    }
-    about.setdefault("horizon", data.steps - about["tabulated"])
-    return eigenfunctions.fit(data, eigenfunctions.Reading(spectrum=Spectrum(**rates), **about), images)
+    steps = {"tabulated": 100, **given}
+    given = {TOLD.get(name, name): value for name, value in given.items() if value is not None}
+    given |= {TOLD.get(n, n): steps[n] * data.dt for n in ("tabulated", "horizon") if steps.get(n) is not None}
+    if given.get("window") != "horizon" and given.get("boundary") != "optimal":
+        given.setdefault("cut", float(np.finfo(float).eps * (data.steps + 1)))
+    return eigenfunctions.fit(data, eigenfunctions.FitEigen.of(**given), images)
 
 
 def grid_sample(count: int = 15, draw: str = "random", seed: int = 0, columns: int = 15) -> Sample:

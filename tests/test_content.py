@@ -13,7 +13,6 @@ from koopcli import content, stages, store
 from koopcli.blocks import Joined
 from koopcli.content import Content
 from koopcli.koopman import stored
-from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.predictor.dynamics.bilinear import Bilinear
 from koopcli.koopman.scores.evaluation import evaluate
@@ -96,7 +95,7 @@ def test_records_of_every_day_in_three_lines(plant):
     assert repr(sample).startswith("Sample: 343 states × 12 rows of inputs\n  states v_x (m/s), v_y (m/s), ")
     data = trajectories_of(plant, sample, 1)
     assert repr(data).startswith("Trajectories: 4116 × 1 steps of 0.01 s\n  states v_x (m/s), ")
-    predictor = edmd.fit(data, edmd.basis_from_data(data, Choice("tensor", 3)))
+    predictor = edmd.fit(data, edmd.FitEdmd.of(basis="tensor", order=3).basis_from(data))
     assert repr(predictor).startswith(
         "Predictor: linear, 64 functions (Polynomial), steps of 0.01 s\n  states v_x (m/s)"
     )

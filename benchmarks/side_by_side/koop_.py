@@ -9,7 +9,6 @@ from competitor import Competitor
 from samples import Samples
 
 import koopcli
-from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.edmd.passes import here
 from koopcli.koopman.edmd.survey import survey
@@ -32,7 +31,7 @@ class Koop(Competitor):
     def fit(self) -> None:
         pairs = Transitions.of(self.data)
         seen = survey(pairs, here(pairs))
-        self.predictor = edmd.fit(pairs, edmd.basis_from_data(pairs, Choice("tensor", 7), seen), seen=seen)
+        self.predictor = edmd.fit(pairs, edmd.FitEdmd.of(basis="tensor", order=7).basis_from(pairs, seen), seen=seen)
 
     def predict(self, x0: np.ndarray, u: np.ndarray) -> np.ndarray:
         return self.predictor.predict(x0, u)

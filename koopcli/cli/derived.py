@@ -6,11 +6,11 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from functools import wraps
-from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin
 
 import typer
 
-from koopcli.checks import Choice, choices, taken, without_none
+from koopcli.checks import Choice, choices, hints_of, taken, without_none
 
 Command = Callable[..., None]
 
@@ -30,8 +30,8 @@ def options_of(*classes: type, only: Sequence[str] = (), but: Sequence[str] = ()
     The settings of the kinds that can be chosen are among them; several ``classes`` are kinds themselves. ``only``:
     some of them; ``but``: those left out.
     """
-    names = [name for name in only or _declared(classes) if name not in but]
-    declared = {name: _declared(classes)[name] for name in names}
+    every = _declared(classes)
+    declared = {name: every[name] for name in only or every if name not in but}
 
     def decorate(command: Command) -> Command:
         own = inspect.signature(command, eval_str=True).parameters
@@ -67,7 +67,7 @@ def _declared(classes: Sequence[type]) -> dict[str, list[Use]]:
     """The settings that have an option by name, with the classes that have them."""
     declared: dict[str, list[Use]] = {}
     for cls in classes:
-        hints, kind = get_type_hints(cls), getattr(cls, "kind", "")
+        hints, kind = hints_of(cls), getattr(cls, "kind", "")
         for f in fields(cls):  # type: ignore[arg-type]
             if f.name in taken(cls):
                 continue

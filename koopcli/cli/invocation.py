@@ -13,12 +13,12 @@ from typing import IO, TYPE_CHECKING, Any
 
 from koopcli.checks import written
 from koopcli.config.changes import Changes, flat, parse_set
-from koopcli.config.experiment import Experiment, load_experiment
 from koopcli.console import Console, show_table
 from koopcli.errors import UnknownNameError, UsageError
 from koopcli.text import printable
 
 if TYPE_CHECKING:
+    from koopcli.config.experiment import Experiment
     from koopcli.config.settings import Simulate
     from koopcli.stages.base import Task
     from koopcli.stages.effects import Plan
@@ -138,6 +138,7 @@ def begin(
     ``sections``: those whose settings the command uses; ``--set`` of any other is refused. ``workers``: how many
     processes share the work, or those of a Dask ``cluster`` by its address.
     """
+    from koopcli.config.experiment import load_experiment
     from koopcli.stages.pipeline import Pipeline
     from koopcli.stages.workers import Workers
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import Field, fields
-from typing import Any, NamedTuple, get_type_hints
+from typing import Any, NamedTuple
 
-from koopcli.checks import choices
+from koopcli.checks import choices, hints_of
 from koopcli.config.pictures import PlotOptions
 from koopcli.config.settings import About, Baseline, Evaluate, Reproduce, Simulate
 from koopcli.koopman.edmd.fit import FitEdmd
@@ -61,7 +61,7 @@ def every_setting() -> Iterator[Declared]:
 
 
 def _of(table: str, cls: type[Any]) -> Iterator[Declared]:
-    hints = get_type_hints(cls)
+    hints = hints_of(cls)
     for f in fields(cls):
         if "help" not in f.metadata:
             continue

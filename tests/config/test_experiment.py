@@ -1,37 +1,40 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import asdict, fields, replace
+from dataclasses import MISSING, fields, replace
 from typing import get_args, get_type_hints
 
 import pytest
-from koopcli.vehicles.options import CUSTOMARY
-from koopcli.vehicles.single_track import WHEELS_PER_FORCE
 
-from koopcli.config import driving, pictures, plants, sampled, samples, settings
-from koopcli.config.changes import SECTIONS, parse_set, toml_value
+from koopcli.checks import Choice, choices, names_of
+from koopcli.config import settings
+from koopcli.config.changes import SECTIONS, flat, parse_set, toml_value
 from koopcli.config.data import data_folder
+from koopcli.config.declared import KINDS, every_setting
 from koopcli.config.experiment import load_experiment
-from koopcli.config.pictures import PlotOptions
 from koopcli.config.settings import About, Baseline, Evaluate, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError, UsageError
-from koopcli.figures.registry import FIGURES
-from koopcli.koopman.bases import BASES
-from koopcli.koopman.bases.thin_plate import PLACEMENTS
+from koopcli.koopman.bases.thin_plate import PLACEMENTS, Splines
 from koopcli.koopman.edmd.fit import FitEdmd
 from koopcli.koopman.eigen.fit import FitEigen
 from koopcli.koopman.eigen.frames import FRAMES
-from koopcli.koopman.eigen.lookup import LOOKUPS
-from koopcli.koopman.eigen.rates import RATES
+from koopcli.koopman.eigen.windows import Ahead
 from koopcli.koopman.scores.baselines import FORECASTS
 from koopcli.simulation.manoeuvres import MANOEUVRES
+from koopcli.simulation.samples.ball import BallSample
 from koopcli.simulation.samples.box import BoxSample
+from koopcli.simulation.samples.drive import DriveSample, DriveTestSample
+from koopcli.simulation.samples.ellipsoid import EllipsoidSample
+from koopcli.simulation.samples.greedy import GreedySample
 from koopcli.simulation.samples.grid import GridSample
+from koopcli.simulation.samples.manoeuvre import ManoeuvreName, ManoeuvreSample
+from koopcli.simulation.samples.sample import INPUTS, Excitation
 from koopcli.simulation.sampling import DRAWS, MESHES
 from koopcli.stages.makers import LIFTED
-from koopcli.vehicles.axles import COMBINED
 from koopcli.vehicles.plants import PLANTS
-from koopcli.vehicles.symmetry import MIRRORS
+from koopcli.vehicles.plants.forces import WHEELS_PER_FORCE, Forces
+from koopcli.vehicles.plants.slips import Slips
+from koopcli.vehicles.symmetry import MIRRORS, Mirror
 
 PAPER = tomllib.loads((data_folder() / "experiments" / "paper.toml").read_text())
 
@@ -39,26 +42,14 @@ PAPER = tomllib.loads((data_folder() / "experiments" / "paper.toml").read_text()
 @pytest.mark.parametrize(
     ("literal", "registry"),
     [
-        (sampled.Draw, DRAWS),
-        (plants.PlantName, PLANTS),
-        (settings.ForcePer, WHEELS_PER_FORCE),
-        (settings.BasisName, BASES),
-        (settings.BasisName, settings.OF_BASIS),
-        (settings.Placement, PLACEMENTS),
-        (pictures.FigureName, FIGURES),
-        (sampled.Kind, samples.SAMPLES),
-        (sampled.Kind, samples.SAMPLED_FOR),
-        (plants.PlantName, samples.CUSTOMS),
-        (plants.PlantName, plants.UNUSED),
-        (plants.PlantName, CUSTOMARY),
-        (settings.Combined, COMBINED),
-        (driving.ManoeuvreName, MANOEUVRES),
-        (sampled.Excitation, sampled.INPUTS),
-        (sampled.Mesh, MESHES),
-        (settings.LiftName, LOOKUPS),
-        (settings.Eigenvalues, RATES),
-        (settings.Coordinates, FRAMES),
-        (sampled.Mirror, MIRRORS),
+        (get_type_hints(GridSample)["draw"], DRAWS),
+        (get_type_hints(Forces)["force_per"], WHEELS_PER_FORCE),
+        (get_type_hints(Splines)["placement"], PLACEMENTS),
+        (ManoeuvreName, MANOEUVRES),
+        (Excitation, INPUTS),
+        (get_type_hints(EllipsoidSample)["mesh"], MESHES),
+        (get_type_hints(Ahead)["coordinates"], FRAMES),
+        (Mirror, MIRRORS),
         (settings.BaselineKind, FORECASTS),
         (settings.FitName, LIFTED),
     ],
@@ -67,9 +58,12 @@ def test_option_names_are_the_registries(literal, registry):
     assert set(get_args(literal)) == set(registry)
 
 
-def test_defaults_said_twice_agree():
-    """Settings are known without the numerics, which have the same numbers for whoever calls them."""
-    assert {k: kind.neighbours for k, kind in LOOKUPS.items() if kind.neighbours is not None} == settings.NEIGHBOURS
+def test_a_setting_is_of_one_choice_alone():
+    """Settings of kinds are named without them, so that no two choices of a section may have the same."""
+    for cls in (FitEdmd, FitEigen, Simulate):
+        names = [{n for kind in base.kinds().values() for n in names_of(kind)} for base in choices(cls).values()]
+        own = {f.name for f in fields(cls)}
+        assert sum(map(len, names)) + len(own) == len(set().union(own, *names))
 
 
 def test_the_paper_file_writes_out_every_default():
@@ -79,48 +73,41 @@ def test_the_paper_file_writes_out_every_default():
     assert loaded.sample("grid") == GridSample()
     assert loaded.test("box", vehicle) == BoxSample()
     body = {"m": vehicle.m, "Jzz": vehicle.Jzz}
-    assert loaded.sample("ellipsoid") == SAMPLES["ellipsoid"](**body)
-    assert loaded.test("ball", vehicle) == SAMPLES["ball"](**body)
-    simulation = {"vehicle": vehicle, "dt": 0.01, "v_eps": 0.1}
-    assert loaded.sample("greedy") == SAMPLES["greedy"](**simulation).settled()
-    rolling = {"r_w": vehicle.r_w}
-    assert loaded.sample("drive") == SAMPLES["drive"](**rolling)
-    assert loaded.test("drive-test", vehicle) == SAMPLES["drive-test"](**rolling)
-    assert loaded.sample("manoeuvre") == SAMPLES["manoeuvre"](vehicle=vehicle, dt=0.01).settled()
+    assert loaded.sample("ellipsoid") == EllipsoidSample(**body)
+    assert loaded.test("ball", vehicle) == BallSample(**body)
+    simulation = {"vehicle": Slips.used(vehicle), "dt": 0.01, "v_eps": 0.1, "combined": "none"}
+    assert loaded.sample("greedy") == GreedySample(**simulation)
+    assert loaded.sample("drive") == DriveSample(r_w=vehicle.r_w)
+    assert loaded.test("drive-test", vehicle) == DriveTestSample(r_w=vehicle.r_w)
+    assert loaded.sample("manoeuvre") == ManoeuvreSample(vehicle=vehicle, dt=0.01)
     assert loaded.about == About()
     assert loaded.fit_edmd == FitEdmd()
     assert loaded.fit_eigen == FitEigen()
     assert loaded.evaluate == Evaluate()
     assert loaded.reproduce == Reproduce()
     assert loaded.simulate == Simulate(vehicle=loaded.simulate.vehicle)
-    for section, kind in (
-        ("sample", "grid"),
-        ("sample", "ellipsoid"),
-        ("sample", "greedy"),
-        ("test", "box"),
-        ("test", "point"),
-        ("test", "ball"),
-        ("sample", "drive"),
-        ("sample", "manoeuvre"),
-        ("test", "drive-test"),
-    ):
-        left = {f.name for f in fields(SAMPLES[kind]) if f.default is None}
-        assert (
-            set(PAPER[section][kind]) == {f.name for f in fields(SAMPLES[kind])} - {"kind", *samples.ELSEWHERE} - left
-        )
-    for section, cls in {"fit-edmd": FitEdmd, "fit-eigen": FitEigen, "evaluate": Evaluate}.items():
-        assert set(PAPER[section]) == {f.name for f in fields(cls) if f.default is not None}
-    assert set(PAPER["reproduce"]) == {f.name for f in fields(Reproduce)}
     assert loaded.baseline == Baseline(**PAPER["baseline"])
+    assert [loaded.plant_for(kind) for kind in PLANTS.values()] == [kind() for kind in PLANTS.values()]
     assert set(PAPER) == set(SECTIONS)
 
 
+def test_the_paper_file_names_every_setting_that_is_not_left_open():
+    said = {name for name, _ in flat(PAPER)}
+    for declared in every_setting():
+        table, name, default = declared.table, declared.name, declared.field.default
+        if isinstance(default, Choice):
+            name = f"{name}.kind"
+        elsewhere = table.partition(".")[0] in KINDS and (table not in IN_PAPER)  # in the other section of samples
+        if default is not None and default is not MISSING and not elsewhere and not table.startswith("vehicle"):
+            assert f"{table}.{name}" in said or declared.table in OPEN, f"{table}.{name}"
+
+
+IN_PAPER = {f"{section}.{kind}" for section in KINDS for kind in PAPER[section]}
+OPEN = {"fit-eigen.window.trajectory.boundary.optimal"}
+
+
 def test_every_setting_has_a_help_text():
-    for cls in (*SAMPLES.values(), About, FitEdmd, FitEigen, Baseline, Evaluate, PlotOptions, Simulate, Reproduce):
-        hints = get_type_hints(cls)
-        for f in fields(cls):
-            if f.name not in ("kind", *samples.ELSEWHERE) or (cls is Simulate and f.name != "vehicle"):
-                assert f.metadata["help"], (cls.__name__, f.name, hints[f.name])
+    assert all(declared.field.metadata["help"] for declared in every_setting())
 
 
 def test_the_command_line_is_laid_over_the_file():
@@ -172,24 +159,11 @@ def test_another_vehicle_keeps_what_the_command_line_changes():
 
 def test_what_a_plant_does_not_use_is_not_in_its_key():
     vehicle = load_experiment("paper", {}).vehicle
-    forces = Simulate(vehicle=vehicle, plant="forces")
-    slippery = Simulate(vehicle=replace(vehicle, mu_scale=0.5, lateral=None), plant="forces", v_eps=1.0)
-    assert forces.settled() == slippery.settled()
-    slips = Simulate(vehicle=vehicle, plant="slips", force_per="wheel")
-    assert slips.settled() == Simulate(vehicle=vehicle, plant="slips").settled()
-    assert slips.settled().vehicle.lateral == vehicle.lateral
-    assert FitEigen.of(boundary="optimal", centres=5, seed=3).settled() == FitEigen.of(boundary="optimal").settled()
-    assert FitEigen().settled() == FitEigen.of(cut=1e-14)
-
-
-def test_values_are_toml_or_plain_text():
-    parsed = parse_set(["sample.levels=[1, 2]", "sample.draw=even", "test.amplitude = 1e3", 'vehicle.name="x"'])
-    assert parsed == {
-        "sample": {"levels": [1, 2], "draw": "even"},
-        "test": {"amplitude": 1e3},
-        "vehicle": {"name": "x"},
-    }
-    assert parse_set(["vehicle.m=1\na=2"]) == {"vehicle": {"m": "1\na=2"}}  # one value, not two lines of TOML
+    slippery = replace(vehicle, mu_scale=0.5, lateral=None)
+    assert Forces.used(vehicle) == Forces.used(slippery) != vehicle
+    slips = Simulate(vehicle=vehicle).settled(Slips(), 10)
+    assert slips.vehicle.lateral == vehicle.lateral
+    assert slips == Simulate(vehicle=replace(vehicle, r_w=0.4)).settled(Slips(), 10)
 
 
 @pytest.mark.parametrize(
@@ -233,13 +207,13 @@ def test_a_vehicle_beside_the_experiment_file(tmp_path):
         ("[sample]\nkind = 'cube'", "unknown kind of sample 'cube'"),
         ("[sample.cube]\nseed = 1", "unknown kind of sample 'cube'"),
         ("[sample]\ngrid = 3", "unknown setting 'sample.grid'"),
-        ("[sample.grid]\nenergy = 3.0", "'sample.grid.energy' belongs to kind 'ellipsoid'"),
+        ("[sample.grid]\nenergy = 3.0", "'sample.grid.energy' belongs to sample 'ellipsoid'"),
         ("[sample.ball]\ncount = 0", "'sample.ball.count' must be at least 1"),
         ("[test.ball]\nm = 3", "'test.ball.m' is the vehicle's: set vehicle.m"),
         ("[sample]\nkind = ['grid']", "unknown kind of sample ['grid']"),
         ("[sample]\nbox = [1e13, 1.0, 1.0]", "'sample.box[0]' must be at most 1e+12"),
         ("[reproduce]\norders = [3, 3]", "'reproduce.orders' names a value twice"),
-        ("[simulate.vehicle]\nm = 1.0", "the vehicle has a section of its own"),
+        ("[simulate.vehicle]\nm = 1.0", "'simulate.vehicle' is the vehicle's: choose it by vehicle.name"),
         ("[test]\ncount = 0", "'test.count' must be at least 1"),
         ("[test]\nkind = 'grid'", "unknown kind of test 'grid'"),
         ("[vehicle]\nJzz = -1", "'vehicle.Jzz' must be above 0"),
@@ -267,4 +241,4 @@ def test_equal_samples_have_equal_settings():
     none = BoxSample(excitation="none")
     assert BoxSample(excitation="none", amplitude=5.0).settled() == none.settled()
     assert BoxSample(excitation="held", amplitude=5.0).settled() != BoxSample(excitation="held").settled()
-    assert asdict(BoxSample().settled()) == asdict(BoxSample())
+    assert BoxSample().settled() == BoxSample()

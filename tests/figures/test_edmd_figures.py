@@ -12,7 +12,6 @@ from koopcli.errors import InvalidValueError
 from koopcli.figures import orders, random_input, spectrum
 from koopcli.figures.drawing import Source
 from koopcli.figures.orders import OrderErrors
-from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
 from koopcli.koopman.scores.restarts import restarted
@@ -171,7 +170,7 @@ def test_growing_eigenvalues_are_told_apart_and_a_zero_has_no_rate():
 def test_random_input_takes_any_predictor(plant):
     """It asks for states and inputs, not for the method."""
     data = _trajectories(7)
-    dmd = edmd.fit(data, edmd.basis_from_data(data, Choice("states", 1)))
+    dmd = edmd.fit(data, edmd.FitEdmd.of(basis="states").basis_from(data))
     shown = random_input.select(
         [Source("", None, {"predictor": dmd, "trajectories": data})], Plot("random-input", "png", "", restart=2)
     )

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import SlipInput
 from matplotlib.colors import to_rgb
 
 from koopcli.errors import InvalidValueError
@@ -23,11 +22,11 @@ from koopcli.figures import (
 )
 from koopcli.figures.drawing import Source
 from koopcli.figures.ends import apart
-from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.scores.evaluation import evaluate
 from koopcli.records import Sample
 from koopcli.simulation import sampling
+from koopcli.vehicles.plants.slips import SlipInput
 from tests.conftest import ball_of, eigen_fit, surface_of, trajectories_of
 from tests.stages.toys import figure_settings
 
@@ -255,7 +254,7 @@ def test_the_states_tell_their_surface(slips, mesh):
 
 
 def test_they_do_not_ask_for_the_method(made):
-    basis = edmd.basis_from_data(made["training"], Choice("states", 1))
+    basis = edmd.FitEdmd.of(basis="states").basis_from(made["training"])
     dmd = edmd.fit(made["training"], basis)
     other = {**made, "predictor": dmd, "evaluation": evaluate(dmd, made["trajectories"], slice(None), 0)}
     for module in (error_map, error_side, mean_trajectory, rmse_histogram, horizon, compare, density):

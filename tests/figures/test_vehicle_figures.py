@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import SlipInput, TorqueInput
 
 from koopcli.config.pictures import Cone
 from koopcli.figures import single_track, trajectory, tyre
@@ -14,6 +13,8 @@ from koopcli.figures.drawing import Source
 from koopcli.records import Trajectories
 from koopcli.simulation.manoeuvres import MANOEUVRES, OFFSET
 from koopcli.vehicles.handling import wheel_loads
+from koopcli.vehicles.plants.slips import SlipInput
+from koopcli.vehicles.plants.wheels import TorqueInput
 from tests.stages.toys import CAR, figure_settings
 
 

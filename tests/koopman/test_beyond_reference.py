@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import SlipInput
 
 from koopcli.config.data import locate
 from koopcli.koopman.eigen.fit import with_images
@@ -16,6 +15,7 @@ from koopcli.koopman.scores.metrics import rmse
 from koopcli.simulation import designs, sampling
 from koopcli.simulation.integrate import simulate
 from koopcli.vehicles.parameters import read_vehicle
+from koopcli.vehicles.plants.slips import SlipInput
 from koopcli.vehicles.symmetry import images
 from tests.conftest import ball_of, eigen_fit, surface_of, trajectories_of
 

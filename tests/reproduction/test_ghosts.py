@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import ForceInput
 
 from koopcli.errors import InvalidValueError
 from koopcli.reproduction import ghosts
 from koopcli.reproduction.road import HALF_WIDTH, OVERHANG, off_text, road
 from koopcli.simulation.integrate import simulate
+from koopcli.vehicles.plants.forces import ForceInput
 
 BOX = (30.0, 30.0, 10.0)
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import TorqueInput
 
 from koopcli.config.experiment import vehicle_named
 from koopcli.records import Packed, Trajectories
 from koopcli.simulation import integrate as integration
 from koopcli.simulation.integrate import LARGEST, LOST, STIFF, integrate, simulate
 from koopcli.simulation.reference import difference, reference
+from koopcli.vehicles.plants.wheels import TorqueInput
 
 
 def explode(x, u):

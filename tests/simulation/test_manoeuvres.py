@@ -6,12 +6,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import TorqueInput
 
 from koopcli.config.experiment import vehicle_named
 from koopcli.simulation import sampling
 from koopcli.simulation.integrate import simulate
 from koopcli.simulation.manoeuvres import MANOEUVRES, Driver
+from koopcli.vehicles.plants.wheels import TorqueInput
 
 
 @cache

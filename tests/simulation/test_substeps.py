@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import SlipInput
 
 from koopcli.simulation import integrate
 from koopcli.simulation.integrate import simulate, substeps
+from koopcli.vehicles.plants.slips import SlipInput
 from tests.conftest import ball_of, surface_of
 
 

@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from koopcli.vehicles.single_track import ForceInput, SlipInput, TorqueInput
 
 from koopcli.checks import build
 from koopcli.config.pictures import Cone, Plot, Series, Subject, Tyres
@@ -23,6 +22,7 @@ from koopcli.koopman.bases.orthonormal import OrthonormalPolynomials
 from koopcli.koopman.bases.polynomial import Polynomial
 from koopcli.koopman.edmd.fit import FitEdmd
 from koopcli.koopman.eigen.fit import FitEigen
+from koopcli.koopman.eigen.lookup.nearest import NearestLift
 from koopcli.koopman.eigen.nodes import Search, nodes_of
 from koopcli.koopman.eigen.tabulated import Tabulated
 from koopcli.koopman.predictor.coverage import Coverage
@@ -50,6 +50,9 @@ from koopcli.simulation.samples.point import PointSample
 from koopcli.stages.base import Context
 from koopcli.stages.registry import STAGES
 from koopcli.vehicles.parameters import MagicFormula, VehicleParameters
+from koopcli.vehicles.plants.forces import ForceInput
+from koopcli.vehicles.plants.slips import SlipInput
+from koopcli.vehicles.plants.wheels import TorqueInput
 
 PINS = Path(__file__).parents[1] / "golden" / "stages.json"
 BEYOND = 1e12  # a condition number past this is rounding
@@ -133,7 +136,7 @@ def _looked_up() -> Predictor:
     starts = 1 + np.sin(np.arange(18.0)).reshape(3, 2, 3)
     C = 10 * np.cos(np.arange(18.0)).reshape(3, 6)
     states = 3 * np.sin(np.arange(45.0) ** 2).reshape(3, 5, 3)
-    lift = Tabulated(states, nodes_of(states, states.shape[1], Search("nearest", np.ones(3))), starts, modes)
+    lift = Tabulated(states, nodes_of(states, states.shape[1], Search(NearestLift(), np.ones(3))), starts, modes)
     regression = Regression(5, 6, 1e3, missed=0.7)
     found = Predictor(lift, Diagonal(modes, 4), C, 0.01, _coverage(), STATES, INPUTS, regression, horizon=8)
     trust = Trust(states.reshape(15, 3), 1 + np.arange(15.0), np.ones(3), 0.5, 1.5)
@@ -152,7 +155,7 @@ def _steered() -> Trajectories:
 
 def _forecast(kind: str) -> Forecast:
     vehicle = {**vars(CAR), "lateral": vars(CAR.lateral), "longitudinal": vars(CAR.longitudinal)}
-    plant = {"plant": "slips", "force_per": "axle", "v_eps": 0.1, "vehicle": vehicle}
+    plant = {"plant": "slips", "v_eps": 0.1, "vehicle": vehicle}
     return Forecast(kind, 0.01, _coverage(), STATES, INPUTS, plant)
 
 

@@ -10,10 +10,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import TorqueInput
 
 from koopcli.config.experiment import vehicle_named
 from koopcli.vehicles import tyre
+from koopcli.vehicles.plants.wheels import TorqueInput
 
 commonroad = pytest.importorskip("vehiclemodels.vehicle_dynamics_std_old")
 

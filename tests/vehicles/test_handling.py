@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import SlipInput
 
 from koopcli.checks import COMMAND_LINE
 from koopcli.config.experiment import vehicle_named
@@ -15,6 +14,7 @@ from koopcli.errors import InvalidValueError
 from koopcli.simulation.portrait import derived, plants_of, remarks
 from koopcli.vehicles import handling
 from koopcli.vehicles.parameters import MagicFormula, change
+from koopcli.vehicles.plants.slips import SlipInput
 
 
 def jacobian(car, speed):

@@ -4,12 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from koopcli.vehicles.options import Options
-from koopcli.vehicles.single_track import WHEELS_PER_FORCE, ForceInput, SlipInput
 
 from koopcli.errors import InvalidValueError
 from koopcli.simulation.integrate import simulate
 from koopcli.vehicles.plants import PLANTS, remembered_plant
+from koopcli.vehicles.plants.forces import WHEELS_PER_FORCE, ForceInput, Forces
+from koopcli.vehicles.plants.slips import SlipInput
 from tests.conftest import ball_of, surface_of
 
 MIRROR_X = np.array([1, -1, -1])  # v_y and yaw rate change sign
@@ -82,7 +82,7 @@ def test_the_power_of_the_forces_is_what_the_energy_gains(plant, vehicle, states
 @pytest.mark.parametrize("name", PLANTS)
 def test_every_plant_keeps_the_contract(name, vehicle):
     for force_per in WHEELS_PER_FORCE:
-        plant = PLANTS[name].configured(vehicle, Options(force_per=force_per))
+        plant = Forces(force_per).of(vehicle)
         n_x, n_u = len(plant.states), len(plant.inputs)
         assert len(plant.states.units) == n_x
         x, u = np.ones((5, 2, n_x)), np.ones((5, 2, n_u))
@@ -176,5 +176,5 @@ def test_a_vehicle_without_tyres_is_refused_for_the_slip_plant(vehicle):
 def test_a_plant_is_remembered_through_json(slips):
     from dataclasses import asdict
 
-    about = {"plant": "slips", "vehicle": asdict(slips.parameters), **asdict(Options(v_eps=0.3, combined="ellipse"))}
+    about = {"plant": "slips", "vehicle": asdict(slips.parameters), "v_eps": 0.3, "combined": "ellipse"}
     assert remembered_plant(json.loads(json.dumps(about))) == SlipInput(slips.parameters, 0.3, "ellipse")

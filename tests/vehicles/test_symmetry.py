@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import SlipInput
 
 from koopcli.config.data import data_folder
 from koopcli.errors import InvalidValueError
 from koopcli.vehicles.parameters import read_vehicle
+from koopcli.vehicles.plants.slips import SlipInput
 from koopcli.vehicles.symmetry import MIRRORS, images, signs
 
 VEHICLES = sorted((data_folder() / "vehicles").glob("*.toml"))

@@ -7,13 +7,14 @@ from math import atan, atan2, cos, hypot, sin, sqrt, tanh
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import SlipInput, TorqueInput
 
 from koopcli.config.experiment import vehicle_named
 from koopcli.errors import InvalidValueError
 from koopcli.simulation.integrate import LARGEST, integrate, simulate
 from koopcli.vehicles.handling import steady_steer, wheel_poles
 from koopcli.vehicles.parameters import MagicFormula
+from koopcli.vehicles.plants.slips import SlipInput
+from koopcli.vehicles.plants.wheels import TorqueInput
 from koopcli.vehicles.tyre import ellipse
 
 MIRROR_X, MIRROR_U = np.array([1, -1, -1, 1, 1]), np.array([-1, 1, 1, -1, 1, 1])

@@ -4,19 +4,22 @@ import numpy as np
 import pytest
 
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.bases import BASES, STORED, Choice
-from koopcli.koopman.bases.thin_plate import thin_plate
+from koopcli.koopman.bases import STORED
+from koopcli.koopman.bases.basis import BasisChoice
+from koopcli.koopman.bases.polynomial import Anisotropic, Tensor, Total
+from koopcli.koopman.bases.states import StatesAlone
+from koopcli.koopman.bases.thin_plate import Splines, thin_plate
 from tests.conftest import grid_sample
 
 CHOICES = {
-    "tensor": Choice("tensor", 3),
-    "total": Choice("total", 4),
-    "anisotropic": Choice("anisotropic", 5, degree_velocity=2),
-    "anisotropic of the yaw rate": Choice("anisotropic", 1, degree_velocity=3),
-    "raw": Choice("total", 3, raw=True),
-    "thin-plate": Choice("thin-plate", centres=20),
-    "thin-plate drawn": Choice("thin-plate", centres=20, placement="drawn", seed=2),
-    "states": Choice("states"),
+    "tensor": Tensor(3),
+    "total": Total(4),
+    "anisotropic": Anisotropic(5, degree_velocity=2),
+    "anisotropic of the yaw rate": Anisotropic(1, degree_velocity=3),
+    "raw": Total(3),
+    "thin-plate": Splines(centres=20),
+    "thin-plate drawn": Splines(centres=20, placement="drawn", seed=2),
+    "states": StatesAlone(),
 }
 
 
@@ -36,18 +39,18 @@ def choice(request):
 
 
 @pytest.fixture
-def basis(choice, grid):
-    return BASES[choice.kind].make(grid, choice)
+def basis(choice, grid, request):
+    return choice.make(grid, raw=request.node.callspec.params["choice"] == "raw")
 
 
 def test_every_kind_is_tried():
-    assert {choice.kind for choice in CHOICES.values()} == set(BASES)
+    assert {choice.kind for choice in CHOICES.values()} == set(BasisChoice.kinds())
 
 
 def test_shape_count_and_constant(choice, basis, x):
     z = basis.lift(x)
     assert z.shape == (40, basis.functions)
-    assert basis.functions == BASES[choice.kind].count(choice, 3)
+    assert basis.functions == choice.count(3)
     assert basis.constant is None or (z[:, basis.constant] == 1).all()
     assert basis.lift(x[:0]).shape == (0, basis.functions)
 
@@ -72,11 +75,14 @@ def test_packed_and_unpacked_it_lifts_the_same(basis, x):
     assert (STORED[packed.meta["kind"]](packed).lift(x) == basis.lift(x)).all()
 
 
-@pytest.mark.parametrize("kind", ["tensor", "total", "anisotropic"])
-@pytest.mark.parametrize(("order", "degree_velocity"), [(1, 1), (3, 2), (2, 5)])
-def test_a_family_is_downward_closed(kind, order, degree_velocity, grid):
+@pytest.mark.parametrize(
+    "choice",
+    [family(order) for family in (Tensor, Total) for order in (1, 3, 2)]
+    + [Anisotropic(order, degree) for order, degree in ((1, 1), (3, 2), (2, 5))],
+)
+def test_a_family_is_downward_closed(choice, grid):
     """Every divisor of a product is in the basis, so that the span does not depend on the origin."""
-    degrees = BASES[kind].make(grid, Choice(kind, order, degree_velocity)).degrees
+    degrees = choice.make(grid).degrees
     there = {tuple(row) for row in degrees.tolist()}
     assert len(there) == len(degrees)
     assert degrees[0].tolist() == [0, 0, 0]
@@ -86,16 +92,16 @@ def test_a_family_is_downward_closed(kind, order, degree_velocity, grid):
 
 
 def test_families_by_hand(grid):
-    total = BASES["total"].make(grid, Choice("total", 2)).degrees
+    total = Total(2).make(grid).degrees
     assert sorted(map(tuple, total.tolist())) == sorted(
         (a, b, c) for a in range(3) for b in range(3) for c in range(3) if a + b + c <= 2
     )
-    few = BASES["anisotropic"].make(grid, Choice("anisotropic", 8, degree_velocity=1)).degrees
+    few = Anisotropic(8, degree_velocity=1).make(grid).degrees
     assert sorted(map(tuple, few.tolist())) == sorted((a, b, c) for a, b in ((0, 0), (0, 1), (1, 0)) for c in range(9))
 
 
 def test_a_subset_is_the_tensor_basis_without_the_others(grid, x):
-    tensor, total = (BASES[kind].make(grid, Choice(kind, 4)) for kind in ("tensor", "total"))
+    tensor, total = (family(4).make(grid) for family in (Tensor, Total))
     chosen = [tensor.degrees.tolist().index(row) for row in total.degrees.tolist()]
     assert (tensor.lift(x)[:, chosen] == total.lift(x)).all()
 
@@ -115,21 +121,21 @@ def test_the_laplacian_of_a_spline_twice():
 
 
 def test_means_of_clusters_lie_in_the_data_and_more_than_there_are_states_are_refused(grid):
-    centres = BASES["thin-plate"].make(grid, Choice("thin-plate", centres=100)).centres
+    centres = Splines(centres=100).make(grid).centres
     assert (centres >= grid.min(axis=0)).all()
     assert (centres <= grid.max(axis=0)).all()
     assert len(np.unique(centres, axis=0)) == 100
     with pytest.raises(InvalidValueError, match="10 centres cannot be the means of 5 different states"):
-        BASES["thin-plate"].make(np.repeat(grid[:5], 4, axis=0), Choice("thin-plate", centres=10))
+        Splines(centres=10).make(np.repeat(grid[:5], 4, axis=0))
 
 
 def test_tensor_is_orthonormal_on_its_grid(grid):
-    z = BASES["tensor"].make(grid, Choice("tensor", 5)).lift(grid)
+    z = Tensor(5).make(grid).lift(grid)
     assert z.T @ z / len(z) == pytest.approx(np.eye(216), abs=1e-10)
 
 
 def test_tensor_spans_the_monomials(grid, x):
-    basis = BASES["tensor"].make(grid, Choice("tensor", 2))
+    basis = Tensor(2).make(grid)
     monomials = np.stack(
         [x[:, 0] ** a * x[:, 1] ** b * x[:, 2] ** c for a in range(3) for b in range(3) for c in range(3)]
     )

@@ -5,7 +5,7 @@ import pytest
 
 from koopcli.koopman.bases.moments import products_of
 from koopcli.koopman.bases.orthonormal import orthonormal_polynomials
-from koopcli.koopman.bases.polynomial import polynomial
+from koopcli.koopman.bases.polynomial import Anisotropic, Tensor, Total
 
 
 def axis_on(nodes, degree):
@@ -49,7 +49,7 @@ def test_little_cancels_wherever_samples_crowd(cloud):
 def test_the_gram_matrix_by_moments_is_the_one_entry_by_entry(states, order):
     rng = np.random.default_rng(2)
     x = rng.uniform(-1, 1, (500, states)) * [30, 20, 5][:states]
-    basis = polynomial(x, "tensor", order, 1)
+    basis = Tensor(order).make(x)
     weights = rng.standard_normal((3, 500))
     z = basis.lift(x)
     direct = np.einsum("qn,ni,nj->qij", weights, z, z)
@@ -59,7 +59,7 @@ def test_the_gram_matrix_by_moments_is_the_one_entry_by_entry(states, order):
 
 def test_only_whole_tensors_of_orthonormal_factors_have_them():
     x = np.random.default_rng(3).uniform(-1, 1, (100, 3))
-    assert polynomial(x, "tensor", 2, 1).products is not None
-    assert polynomial(x, "total", 2, 1).products is None
-    assert polynomial(x, "anisotropic", 3, 2).products is None
-    assert polynomial(x, "tensor", 2, 1, raw=True).products is None
+    assert Tensor(2).make(x).products is not None
+    assert Total(2).make(x).products is None
+    assert Anisotropic(3, 2).make(x).products is None
+    assert Tensor(2).make(x, raw=True).products is None

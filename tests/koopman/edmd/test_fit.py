@@ -12,7 +12,8 @@ from scipy.linalg import expm
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import stored
-from koopcli.koopman.bases import Choice
+from koopcli.koopman.bases.polynomial import Anisotropic, Total
+from koopcli.koopman.bases.thin_plate import Splines
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.edmd import sums, survey
 from koopcli.koopman.edmd.transitions import Transitions
@@ -127,10 +128,10 @@ def reduced(plant):
 
 @pytest.mark.parametrize("order", [2, 5])
 def test_blocks_and_product_agree(reduced, order):
-    basis = edmd.basis_from_data(reduced, Choice("tensor", order))
+    basis = edmd.FitEdmd.of(basis="tensor", order=order).basis_from(reduced)
     product = edmd.fit(reduced, basis)
     general = replace(reduced, product=None)
-    other = edmd.basis_from_data(general, Choice("tensor", order))
+    other = edmd.FitEdmd.of(basis="tensor", order=order).basis_from(general)
     blocks = edmd.fit(general, other)
     for name in "AB":
         one, two = getattr(product.dynamics, name), getattr(blocks.dynamics, name)
@@ -143,7 +144,7 @@ def test_blocks_and_product_agree(reduced, order):
 
 def test_the_size_of_a_block_does_not_matter(reduced, monkeypatch):
     general = replace(reduced, product=None)
-    basis = edmd.basis_from_data(general, Choice("tensor", 3))
+    basis = edmd.FitEdmd.of(basis="tensor", order=3).basis_from(general)
     large = edmd.fit(general, basis)
     monkeypatch.setattr(sums, "READ", 100)
     small = edmd.fit(general, basis)
@@ -154,7 +155,7 @@ def test_the_size_of_a_block_does_not_matter(reduced, monkeypatch):
 def test_a_raw_monomial_fit_predicts_the_same(plant, reduced):
     """At order 4 the normal equations on raw monomials still hold, and EDMD does not depend on the basis chosen."""
     data = reduced
-    predictor = edmd.fit(data, edmd.basis_from_data(data, Choice("tensor", 4)))
+    predictor = edmd.fit(data, edmd.FitEdmd.of(basis="tensor", order=4).basis_from(data))
     raw = Monomials(tuple((a, b, c) for a in range(5) for b in range(5) for c in range(5)))
     gram, cross = np.zeros((129, 129)), np.zeros((129, 125))
     for x, u, x_next in Transitions.of(data).blocks(4096):
@@ -222,7 +223,7 @@ def test_a_bilinear_system_is_recovered_exactly(product, constant):
     data, A, B, N = bilinear_data(product)
     exponents = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
     basis = Monomials(((0, 0, 0), *exponents) if constant else exponents)
-    predictor = edmd.fit(data, basis, edmd.Method(bilinear=True))
+    predictor = edmd.fit(data, basis, edmd.FitEdmd.of(terms="bilinear"))
     at = slice(1, None) if constant else slice(None)
     assert predictor.dynamics.A[at, at] == pytest.approx(A, abs=1e-10)
     assert predictor.dynamics.B[at] == pytest.approx(B, abs=1e-10)
@@ -237,11 +238,11 @@ def test_a_bilinear_system_is_recovered_exactly(product, constant):
 @pytest.mark.parametrize("ridge", [0.0, 1e-3])
 @pytest.mark.parametrize(
     ("choice", "bilinear"),
-    [(Choice("anisotropic", 4, 2), True), (Choice("total", 3), False), (Choice("thin-plate", centres=30), False)],
+    [(Anisotropic(4, degree_velocity=2), True), (Total(3), False), (Splines(centres=30), False)],
 )
 def test_blocks_and_product_agree_for_every_method(reduced, choice, bilinear, ridge):
-    method = edmd.Method(bilinear, ridge)
-    basis = edmd.basis_from_data(reduced, choice)
+    method = edmd.FitEdmd.of(terms="bilinear" if bilinear else "linear", ridge=ridge)
+    basis = edmd.FitEdmd(choice).basis_from(reduced)
     fast, plain = (edmd.fit(data, basis, method) for data in (reduced, replace(reduced, product=None)))
     size = np.abs(plain.dynamics.A).max()
     assert pytest.approx(plain.dynamics.A, abs=1e-9 * size) == fast.dynamics.A
@@ -255,7 +256,9 @@ def test_blocks_and_product_agree_for_every_method(reduced, choice, bilinear, ri
 
 
 def test_a_bilinear_prediction_is_the_rolled_system(reduced, monkeypatch):
-    predictor = edmd.fit(reduced, edmd.basis_from_data(reduced, Choice("anisotropic", 3)), edmd.Method(bilinear=True))
+    predictor = edmd.fit(
+        reduced, edmd.FitEdmd.of(basis="anisotropic", order=3).basis_from(reduced), edmd.FitEdmd.of(terms="bilinear")
+    )
     rng = np.random.default_rng(3)
     x0, u = rng.uniform(-5, 5, (9, 3)), rng.uniform(-1e4, 1e4, (9, 6, 4))
     z, expected = predictor.lift(x0), [x0]
@@ -295,7 +298,9 @@ def test_the_generator_of_a_bilinear_flow_is_recovered():
     data = synthetic(step, np.repeat(states, 4, axis=0), np.tile(columns[:, None], (30, 1, 1)), (30, 4))
     data = replace(data, dt=dt)
     basis = Monomials(((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)))
-    slope, exact = (edmd.fit(data, basis, edmd.Method(bilinear=True, generator=g)) for g in (False, True))
+    slope, exact = (
+        edmd.fit(data, basis, edmd.FitEdmd.of(terms="generator" if g else "bilinear")) for g in (False, True)
+    )
     assert exact.dynamics.K[0, 1:, 1:] == pytest.approx(K, abs=1e-6)
     assert exact.dynamics.K[1:, 1:, 1:] == pytest.approx(Ks, abs=1e-5)
     assert pytest.approx(L, abs=1e-5) == exact.dynamics.K[1:, 1:, 0].T
@@ -304,8 +309,8 @@ def test_the_generator_of_a_bilinear_flow_is_recovered():
     assert errors[0] > 1e-2
     assert errors[1] < 1e-5
     assert exact.step(far.x[:, 0], far.u[:, 0]) == pytest.approx(far.x[:, 1], abs=1e-5)
-    method = edmd.Method(bilinear=True, generator=True)
-    held = edmd.fit(data, edmd.basis_from_data(data, Choice("total", 1)), method)
+    method = edmd.FitEdmd.of(terms="generator")
+    held = edmd.fit(data, edmd.FitEdmd.of(basis="total", order=1).basis_from(data), method)
     again = stored.predictor(held.pack())
     assert (again.predict(far.x[:, 0], far.u) == held.predict(far.x[:, 0], far.u)).all()
     assert held.predict(far.x[:, 0], far.u) == pytest.approx(far.x, abs=1e-5)  # whatever the coordinates
@@ -317,14 +322,16 @@ def test_a_step_that_turns_over_has_no_generator():
     u = np.tile(np.array([[[0.1]], [[-0.1]]]), (20, 1, 1))
     data = synthetic(lambda x, u: x @ np.diag([-0.5, 0.5]) + u, np.repeat(rng.standard_normal((20, 2)), 2, axis=0), u)
     with pytest.raises(InvalidValueError, match="no real generator"):
-        edmd.fit(data, Monomials(((0, 0), (1, 0), (0, 1))), edmd.Method(bilinear=True, generator=True))
+        edmd.fit(data, Monomials(((0, 0), (1, 0), (0, 1))), edmd.FitEdmd.of(terms="generator"))
 
 
 def test_without_products_in_the_truth_there_are_none_in_the_fit():
     data, A, B, _ = bilinear_data(product=True)
     straight = synthetic(lambda x, u: x @ A.T + u @ B.T, data.x[:, 0], data.u, data.product)
     basis = Monomials(((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)))
-    linear, bilinear = (edmd.fit(straight, basis, edmd.Method(terms)) for terms in (False, True))
+    linear, bilinear = (
+        edmd.fit(straight, basis, edmd.FitEdmd.of(terms="bilinear" if terms else "linear")) for terms in (False, True)
+    )
     assert np.abs(bilinear.dynamics.N).max() < 1e-12
     assert pytest.approx(linear.dynamics.A, abs=1e-12) == bilinear.dynamics.A
 
@@ -332,8 +339,8 @@ def test_without_products_in_the_truth_there_are_none_in_the_fit():
 def test_a_ridge_is_the_least_squares_of_rows_added(reduced):
     """The penalty is on scaled columns: the same as rows √ridge e_i under the data, but for the constant and B."""
     general, ridge = replace(reduced, product=None), 0.05
-    basis = edmd.basis_from_data(general, Choice("total", 2))
-    predictor = edmd.fit(general, basis, edmd.Method(ridge=ridge))
+    basis = edmd.FitEdmd.of(basis="total", order=2).basis_from(general)
+    predictor = edmd.fit(general, basis, edmd.FitEdmd.of(ridge=ridge))
     x, u, x_next = (np.concatenate(found) for found in zip(*Transitions.of(general).blocks(4096), strict=True))
     V = np.hstack([basis.lift(x), u - u.mean(axis=0)])
     scale = np.linalg.norm(V, axis=0)
@@ -347,9 +354,10 @@ def test_a_ridge_is_the_least_squares_of_rows_added(reduced):
 
 
 def test_a_larger_ridge_shrinks(reduced):
-    basis = edmd.basis_from_data(reduced, Choice("tensor", 2))
+    basis = edmd.FitEdmd.of(basis="tensor", order=2).basis_from(reduced)
     sizes = [
-        np.linalg.norm(edmd.fit(reduced, basis, edmd.Method(ridge=r)).dynamics.A[:, 1:]) for r in (0, 1e-3, 1e-1, 10)
+        np.linalg.norm(edmd.fit(reduced, basis, edmd.FitEdmd.of(ridge=r)).dynamics.A[:, 1:])
+        for r in (0, 1e-3, 1e-1, 10)
     ]
     assert sizes == sorted(sizes, reverse=True)
     assert sizes[-1] < 0.2 * sizes[0]
@@ -361,7 +369,13 @@ def test_the_textbooks_normal_equations_agree_while_they_last(plant):
     data = trajectories_of(plant, grid_sample(count=11, columns=2), 1)
     test = trajectories_of(plant, box_sample(100), 30)
     plain, sound = (
-        edmd.fit(data, edmd.basis_from_data(data, Choice("tensor", 4, raw=raw)), edmd.Method(cholesky=raw))
+        edmd.fit(
+            data,
+            edmd.FitEdmd.of(basis="tensor", order=4, solver="cholesky-monomials" if raw else "orthonormal").basis_from(
+                data
+            ),
+            edmd.FitEdmd.of(solver="cholesky-monomials" if raw else "orthonormal"),
+        )
         for raw in (True, False)
     )
     expected = sound.predict(test.x[:, 0], test.u)
@@ -369,7 +383,11 @@ def test_the_textbooks_normal_equations_agree_while_they_last(plant):
     assert plain.regression.condition > 1e12
     assert sound.regression.condition < 100
     with pytest.raises(InvalidValueError, match="not positive definite any more"):
-        edmd.fit(data, edmd.basis_from_data(data, Choice("tensor", 9, raw=True)), edmd.Method(cholesky=True))
+        edmd.fit(
+            data,
+            edmd.FitEdmd.of(basis="tensor", order=9, solver="cholesky-monomials").basis_from(data),
+            edmd.FitEdmd.of(solver="cholesky-monomials"),
+        )
 
 
 def test_what_leaves_a_fit_open_is_named(reduced):
@@ -390,17 +408,17 @@ def test_what_leaves_a_fit_open_is_named(reduced):
         assert predictor.regression.rank < predictor.regression.directions
         assert re.search(cause, edmd.why_deficient(data, predictor))
     with pytest.raises(InvalidValueError, match=r"v_y is 3 m/s throughout .* not 2"):
-        edmd.basis_from_data(still, Choice("tensor", 2))
+        edmd.FitEdmd.of(basis="tensor", order=2).basis_from(still)
 
 
 def test_a_basis_from_many_rows_uses_a_spread_choice(monkeypatch, reduced):
     """Regular data must not be subsampled in step with their own period."""
     general = replace(reduced, product=None)
     monkeypatch.setattr(survey, "MARGINAL_ROWS", 2000)
-    basis = edmd.basis_from_data(general, Choice("tensor", 8))  # all nine values of each state are found
+    basis = edmd.FitEdmd.of(basis="tensor", order=8).basis_from(general)  # all nine values of each state are found
     assert basis.functions == 9**3
     monkeypatch.setattr(survey, "MARGINAL_ROWS", 10)
-    assert edmd.basis_from_data(reduced, Choice("tensor", 8)).functions == 9**3
+    assert edmd.FitEdmd.of(basis="tensor", order=8).basis_from(reduced).functions == 9**3
 
 
 def test_long_trajectories_are_read_in_pieces(reduced):
@@ -415,13 +433,13 @@ def test_a_false_product_is_found_out(reduced):
     x = np.array(reduced.x)
     x[3, 0, 0] += 1.0
     with pytest.raises(InvalidValueError, match="are marked as a product"):
-        edmd.fit(replace(reduced, x=x), edmd.basis_from_data(reduced, Choice("tensor", 2)))
+        edmd.fit(replace(reduced, x=x), edmd.FitEdmd.of(basis="tensor", order=2).basis_from(reduced))
     with pytest.raises(InvalidValueError, match="are not a product of"):
         replace(reduced, product=(7, 7))
 
 
 def test_too_few_samples_are_refused(reduced):
-    basis = edmd.basis_from_data(reduced, Choice("tensor", 5))
+    basis = edmd.FitEdmd.of(basis="tensor", order=5).basis_from(reduced)
     few = replace(reduced, x=reduced.x[:100], u=reduced.u[:100], product=None)
     with pytest.raises(InvalidValueError, match="100 samples cannot determine 216 functions and 4 inputs"):
         edmd.fit(few, basis)
@@ -445,7 +463,7 @@ def scored(full, tests):
     @cache
     def fitted(draw, order, seed):
         data = full(draw, seed)
-        return edmd.fit(data, edmd.basis_from_data(data, Choice("tensor", order)))
+        return edmd.fit(data, edmd.FitEdmd.of(basis="tensor", order=order).basis_from(data))
 
     @cache
     def figures(excitation, *which):
@@ -481,12 +499,14 @@ def test_yaw_rate_on_other_random_draws(scored, seed):
 @pytest.mark.parametrize("draw", [pytest.param("random", marks=pytest.mark.slow), "even"])
 def test_bilinear_terms_break_the_floor_with_27_functions(full, tests, draw):
     data = full(draw, 0)
-    predictor = edmd.fit(data, edmd.basis_from_data(data, Choice("anisotropic", 8)), edmd.Method(bilinear=True))
+    predictor = edmd.fit(
+        data, edmd.FitEdmd.of(basis="anisotropic", order=8).basis_from(data), edmd.FitEdmd.of(terms="bilinear")
+    )
     assert predictor.functions == 27
     for excitation in ("fresh", "held"):
         score = evaluate(predictor, tests[excitation], slice(None), 1, relift=False).figures()["rmse"]
         assert score["mean"] == pytest.approx(REFERENCE["bilinear"][draw][excitation], rel=0.02)
-    exact = edmd.fit(data, predictor.observables, edmd.Method(bilinear=True, generator=True))
+    exact = edmd.fit(data, predictor.observables, edmd.FitEdmd.of(terms="generator"))
     for excitation, limit in (("fresh", 0.5), ("held", 0.5)):  # what is quadratic in the inputs was half of it
         score = evaluate(exact, tests[excitation], slice(None), 1, relift=False).figures()["rmse"]
         assert score["mean"] < limit * REFERENCE["bilinear"][draw][excitation]

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import blockwise, regression, sums
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.edmd import survey as survey_module
@@ -20,7 +19,11 @@ from koopcli.koopman.edmd.transitions import Transitions
 from koopcli.progress import silent
 from tests.conftest import box_sample, trajectories_of
 
-METHODS = {"linear": edmd.Method(), "bilinear": edmd.Method(bilinear=True), "ridge": edmd.Method(ridge=1e-3)}
+METHODS = {
+    "linear": edmd.FitEdmd(),
+    "bilinear": edmd.FitEdmd.of(terms="bilinear"),
+    "ridge": edmd.FitEdmd.of(ridge=1e-3),
+}
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +33,7 @@ def data(plant):
 
 @pytest.fixture(scope="module")
 def basis(data):
-    return edmd.basis_from_data(data, Choice("tensor", 2))
+    return edmd.FitEdmd.of(basis="tensor", order=2).basis_from(data)
 
 
 def in_parts(data, size):
@@ -117,7 +120,7 @@ def test_a_harmful_condition_goes_to_qr_by_itself(plant):
     x0 = sample.states.copy()
     x0[:, 1] = x0[:, 0] * (1 + 1e-5 * rng.standard_normal(len(x0)))
     data = trajectories_of(plant, replace(sample, states=x0), 1)
-    found = edmd.fit(data, edmd.basis_from_data(data, Choice("total", 2)))
+    found = edmd.fit(data, edmd.FitEdmd.of(basis="total", order=2).basis_from(data))
     assert found.regression.solved_by == "QR"
     assert found.regression.rank == found.regression.directions == 14
     assert found.regression.condition > 1e4
@@ -177,7 +180,7 @@ def test_an_input_that_stands_still_through_many_blocks_moves_nothing(plant, sti
     inputs = sample.inputs.copy()
     inputs[..., 2] = still
     data = trajectories_of(plant, replace(sample, inputs=inputs), 1)
-    found = edmd.fit(data, edmd.basis_from_data(data, Choice("total", 1)))
+    found = edmd.fit(data, edmd.FitEdmd.of(basis="total", order=1).basis_from(data))
     assert found.regression.rank == found.regression.directions == 7
     assert not found.dynamics.B[:, 2].any()
     assert found.regression.condition < 10

@@ -7,21 +7,21 @@ from pathlib import Path
 import mpmath as mp
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import SlipInput
 from scipy.linalg import expm
 
 from koopcli.config.data import locate
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import stored
-from koopcli.koopman.bases import Choice
 from koopcli.koopman.bases.thin_plate import draw_centres, thin_plate
 from koopcli.koopman.edmd import fit as edmd
-from koopcli.koopman.eigen.rates import check_growth, dmd_rates, lattice, lattice_size
+from koopcli.koopman.eigen.rates.dmd import Dmd, dmd_rates, lattice
+from koopcli.koopman.eigen.rates.rates import check_growth
 from koopcli.koopman.predictor.modes import exponentials
 from koopcli.koopman.scores.baselines import FORECASTS, Forecast
 from koopcli.koopman.scores.evaluation import evaluate
 from koopcli.records import Channels, Trajectories
 from koopcli.vehicles.parameters import read_vehicle
+from koopcli.vehicles.plants.slips import SlipInput
 from tests.conftest import ball_of, eigen_fit, grid_sample, surface_of, trajectories_of
 
 REFERENCE = json.loads((Path(__file__).parents[2] / "golden" / "eigen_reference.json").read_text())
@@ -65,7 +65,7 @@ def test_rates_that_no_system_in_continuous_time_has():
 def test_the_lattice(degree, size):
     rates = np.array([-0.466, -1.053, -1.329], dtype=complex)
     found = lattice(rates, degree)
-    assert len(found) == size == lattice_size(3, degree)
+    assert len(found) == size == Dmd(degree).count(3)
     sums = {
         round(float((np.array([a, b, c]) * rates.real).sum()), 9)
         for a in range(degree + 1)
@@ -285,13 +285,13 @@ def test_the_baselines(full, vehicle):
     parameters = read_vehicle(locate("vehicles", vehicle, "vehicle"))
     from dataclasses import asdict
 
-    about = {"plant": "slips", "force_per": "axle", "v_eps": 0.1, "vehicle": asdict(parameters)}
+    about = {"plant": "slips", "v_eps": 0.1, "vehicle": asdict(parameters)}
     coverage = edmd.coverage(training)
     for kind in FORECASTS:
         one = Forecast(kind, 0.01, coverage, training.state_channels, training.input_channels, about)
         found = evaluate(one, test, slice(None), 0, relift=False).figures()["rmse"]["mean"]
         assert found == pytest.approx(expected[kind], abs=0.6)
-    dmd = edmd.fit(training, edmd.basis_from_data(training, Choice("states", 1)))
+    dmd = edmd.fit(training, edmd.FitEdmd.of(basis="states").basis_from(training))
     assert evaluate(dmd, test, slice(None), 0, relift=False).figures()["rmse"]["mean"] == pytest.approx(
         expected["dmd"], abs=0.6
     )

@@ -12,7 +12,7 @@ from koopcli.errors import InvalidValueError
 from koopcli.koopman import stored
 from koopcli.koopman.eigen.fit import with_images
 from koopcli.koopman.eigen.frames import FRAMES, check_frame, yaw
-from koopcli.koopman.eigen.lookup import LOOKUPS
+from koopcli.koopman.eigen.lookup.lookup import Lift
 from koopcli.koopman.predictor.coverage import spread
 from koopcli.koopman.predictor.trust import LEVEL, calibrated
 from koopcli.koopman.scores.metrics import rmse
@@ -111,7 +111,7 @@ def test_the_first_sample_is_the_state_itself(rolling):
     assert rmse(predictor.predict(x0, steps=0), x0[:, np.newaxis]).mean() < 0.05
 
 
-@pytest.mark.parametrize("lift", LOOKUPS)
+@pytest.mark.parametrize("lift", Lift.kinds())
 def test_it_survives_storage(rolling, lift):
     data, test = rolling
     predictor = eigen_fit(data, **AHEAD, lift=lift, frame="world", tabulated=50, nodes=6, spacing=2, trust=True)

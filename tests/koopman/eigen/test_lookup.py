@@ -6,10 +6,13 @@ from scipy.interpolate import RBFInterpolator
 from scipy.spatial import Delaunay
 
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.eigen.lookup import LOOKUPS, check_nodes, search
 from koopcli.koopman.eigen.lookup.cloud import Cloud
+from koopcli.koopman.eigen.lookup.lookup import Lift, search
+from koopcli.koopman.eigen.lookup.nearest import NearestLift
 from koopcli.koopman.eigen.lookup.polyharmonic import LARGEST, spline_weights
 from koopcli.koopman.eigen.nodes import Search, nodes_of, thinned
+
+LIFTS = Lift.kinds()
 
 
 def cloud(places, neighbours=60, spacing=None, trajectories=1):
@@ -28,7 +31,7 @@ def inside():
 
 
 def made(kind, places, **more):
-    return LOOKUPS[kind].make(cloud(places, LOOKUPS[kind].neighbours or 1, **more))
+    return LIFTS[kind]().make(cloud(places, LIFTS[kind]().neighbours, **more))
 
 
 def value(found, values):
@@ -39,7 +42,7 @@ def value(found, values):
 LINEAR = np.array([[1.0, -2.0], [0.5, 3.0], [2.0, 0.1]])
 
 
-@pytest.mark.parametrize("kind", LOOKUPS)
+@pytest.mark.parametrize("kind", LIFTS)
 def test_weights_add_up_to_one(kind, places, inside):
     _, weights = made(kind, places)(inside)
     assert weights.sum(axis=1) == pytest.approx(np.ones(300), abs=1e-9)
@@ -159,7 +162,7 @@ def test_the_nearest_by_brute_force(places, inside):
     assert (weights == 1).all()
 
 
-@pytest.mark.parametrize("kind", LOOKUPS)
+@pytest.mark.parametrize("kind", LIFTS)
 def test_a_place_that_is_not_finite_has_no_weights(kind, places):
     y = np.array([[0.1, np.nan, 0], [0.2, 0.1, 0.0]])
     indices, weights = search(made(kind, places), y)
@@ -172,14 +175,14 @@ def test_too_few_nodes_and_nodes_in_a_plane():
     flat = np.random.default_rng(9).uniform(-1, 1, (80, 3)) * [1, 1, 0]
     for kind in ("linear", "mls", "polyharmonic"):
         with pytest.raises(InvalidValueError, match=f"nodes lie in a plane, where the lift '{kind}'"):
-            check_nodes(kind, flat, None)
-    assert check_nodes("nearest", flat, None) == 1
+            LIFTS[kind]().check(flat)
+    NearestLift().check(flat)
     with pytest.raises(InvalidValueError, match=r"'linear' needs 4 nodes and the data have 3"):
-        check_nodes("linear", flat[:3], None)
+        LIFTS["linear"]().check(flat[:3])
     with pytest.raises(InvalidValueError, match=r"needs 60 nodes and the data have 59: .*take fewer neighbours"):
-        check_nodes("polyharmonic", np.random.default_rng(0).standard_normal((59, 3)), None)
+        LIFTS["polyharmonic"]().check(np.random.default_rng(0).standard_normal((59, 3)))
     with pytest.raises(InvalidValueError, match=r"'fit-eigen\.neighbours' must be at least 10 .*, got 7"):
-        check_nodes("polyharmonic", flat, 7)
+        LIFTS["polyharmonic"](7).check(flat)
 
 
 def test_thinning_keeps_the_first_of_each_voxel():
@@ -199,7 +202,7 @@ def test_thinning_keeps_the_first_of_each_voxel():
 
 def test_nodes_know_their_samples():
     x = np.random.default_rng(11).standard_normal((6, 9, 3))
-    found = nodes_of(x, 5, Search("nearest", np.ones(3), nodes=3))
+    found = nodes_of(x, 5, Search(NearestLift(), np.ones(3)), 3)
     assert len(found.kept) <= 18
     assert (found.sample < 5).all()
     assert (found.states == x[found.trajectory, found.sample]).all()
@@ -207,5 +210,5 @@ def test_nodes_know_their_samples():
 
 def test_a_radial_power_spreads_out_the_middle():
     x = np.array([[4.0, 0, 0], [0, -1.0, 0], [0, 0, 0]])
-    found = Search("nearest", np.array([4.0, 4, 4]), power=0.5).place(x)
+    found = Search(NearestLift(), np.array([4.0, 4, 4]), power=0.5).place(x)
     assert found == pytest.approx(np.array([[1, 0, 0], [0, -0.5, 0], [0, 0, 0]]))

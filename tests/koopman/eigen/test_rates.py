@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from koopcli.koopman.eigen.rates import RATES, Spectrum, comb, projected_residual, searched
+from koopcli.koopman.eigen.rates.comb import Comb
+from koopcli.koopman.eigen.rates.varpro import Varpro, projected_residual, searched
 from koopcli.koopman.predictor.modes import exponentials
 
-COMB = Spectrum("comb", 2, 10, 2.0, 26.0, 1.0)
+COMB = Comb(10, 2.0, 26.0, 1.0)
 
 
 def test_the_comb_as_written_down():
-    found = comb(COMB)
+    found = COMB.even
     assert len(found) == 22 == COMB.count(3)
     assert found[:20:2] == pytest.approx(-1 + 1j * np.linspace(2, 26, 10))
     assert found[1:20:2] == pytest.approx(found[:20:2].conj())
@@ -51,16 +52,16 @@ def test_the_gradient_is_that_of_the_residual():
 
 def test_the_search_finds_the_rates_of_the_data():
     true = np.array([-0.7 + 5j, -0.7 - 5j, -2 + 12j, -2 - 12j, 0.0, -1.5])
-    found = searched(sums(true), 0.02, Spectrum("varpro", 0, 2, 3.0, 15.0, 1.0))
+    found = searched(sums(true), 0.02, Varpro(2, 3.0, 15.0, 1.0))
     assert np.sort_complex(found) == pytest.approx(np.sort_complex(true), abs=2e-3)
 
 
 def test_the_search_is_no_worse_than_where_it_starts():
     rng = np.random.default_rng(1)
     x = [np.cumsum(rng.standard_normal((30, 41, 3)), axis=1)]
-    spectrum = Spectrum("varpro", 0, 3, 2.0, 20.0, 1.0)
+    spectrum = Varpro(3, 2.0, 20.0, 1.0)
     columns = x[0].transpose(1, 0, 2).reshape(41, -1)
     gram, t = columns @ columns.T / (columns**2).sum(), 0.01 * np.arange(41.0)
-    before = projected_residual(gram, comb(spectrum), t)[0]
-    after = projected_residual(gram, RATES["varpro"](x[0], x, 0.01, spectrum), t)[0]
+    before = projected_residual(gram, spectrum.even, t)[0]
+    after = projected_residual(gram, spectrum.find(x[0], x, 0.01), t)[0]
     assert after < 0.9 * before

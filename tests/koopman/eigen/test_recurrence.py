@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import SlipInput
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.eigen.recurrence import TOUCH, Surface, _miss, check_recurrence, check_starts
+from koopcli.vehicles.plants.slips import SlipInput
 from tests.conftest import surface_of, trajectories_of
 
 

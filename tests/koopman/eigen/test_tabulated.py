@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from koopcli.koopman.eigen.lookup import LOOKUPS
+from koopcli.koopman.eigen.lookup.lookup import Lift
 from koopcli.koopman.eigen.nodes import Search, nodes_of
 from koopcli.koopman.eigen.tabulated import Tabulated
 from koopcli.koopman.predictor.modes import Modes, newton_couplings
@@ -18,10 +18,10 @@ def parts(request):
     return rng.uniform(-1, 1, (7, 11, 3)), rng.standard_normal((7, 5, request.param)), modes
 
 
-@pytest.fixture(params=LOOKUPS)
+@pytest.fixture(params=Lift.kinds().values())
 def lift(request, parts):
     states, starts, modes = parts
-    return Tabulated(states, nodes_of(states, 11, Search(request.param, np.array([1.0, 2.0, 0.5]))), starts, modes)
+    return Tabulated(states, nodes_of(states, 11, Search(request.param(), np.array([1.0, 2.0, 0.5]))), starts, modes)
 
 
 def test_at_a_tabulated_sample_it_is_the_initial_lifted_state_carried_on(lift, parts):

@@ -5,7 +5,6 @@ import pytest
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import stored
-from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.predictor import responses
 from koopcli.koopman.predictor.regression import Regression
@@ -15,7 +14,7 @@ from tests.conftest import grid_sample, trajectories_of
 @pytest.fixture(scope="module")
 def predictor(plant):
     data = trajectories_of(plant, grid_sample(count=7, columns=3), 1)
-    return edmd.fit(data, edmd.basis_from_data(data, Choice("tensor", 3)))
+    return edmd.fit(data, edmd.FitEdmd.of(basis="tensor", order=3).basis_from(data))
 
 
 @pytest.fixture

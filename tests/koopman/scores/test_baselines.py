@@ -4,15 +4,15 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import ForceInput
 
 from koopcli.koopman.predictor.coverage import coverage_of
 from koopcli.koopman.scores.baselines import FORECASTS, Forecast, _exponential
+from koopcli.vehicles.plants.forces import ForceInput
 from tests.conftest import ball_of, box_sample, trajectories_of
 
 
 def forecast(kind, plant, name="slips"):
-    about = {"plant": name, "force_per": "axle", "v_eps": 0.1, "vehicle": asdict(plant.parameters)}
+    about = {"plant": name, "vehicle": asdict(plant.parameters)}
     states = np.random.default_rng(0).uniform(-1, 1, (20, 3))
     coverage = coverage_of(states)
     return Forecast(kind, 0.01, coverage, plant.states, plant.inputs, about)

@@ -4,20 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from koopcli.vehicles.single_track import SlipInput
 
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.predictor.dynamics.bilinear import Bilinear
 from koopcli.koopman.scores.evaluation import Evaluation, evaluate, join
+from koopcli.vehicles.plants.slips import SlipInput
 from tests.conftest import ball_of, box_sample, eigen_fit, grid_sample, surface_of, trajectories_of
 
 
 @pytest.fixture(scope="module")
 def pair(plant):
     data = trajectories_of(plant, grid_sample(count=7, columns=3), 1)
-    predictor = edmd.fit(data, edmd.basis_from_data(data, Choice("tensor", 3)))
+    predictor = edmd.fit(data, edmd.FitEdmd.of(basis="tensor", order=3).basis_from(data))
     return predictor, trajectories_of(plant, box_sample(50, steps=8), 8)
 
 
