@@ -1,11 +1,54 @@
-"""Figures: plain records in, a matplotlib figure out."""
+"""Figures: plain records in, a matplotlib figure out. Every file of this folder is a figure, called as the file is.
+
+``FIGURE`` says what it shows, takes and makes; ``select(sources, settings)`` gathers what it shows in a small record,
+``numbers(shown)`` gives that as columns, ``draw(shown)`` as a matplotlib figure.
+"""
 
 import hashlib
 import re
+from collections.abc import Iterator, Mapping
 from functools import cache
+from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-PLAIN = ("config/settings", "errors", "records")  # what is taken of these is data, not something drawn
+if TYPE_CHECKING:
+    from koopcli.figures.common.kind import FigureKind
+
+# what is taken of these is data, not something drawn
+PLAIN = ("config/experiment", "config/samples", "config/settings", "errors", "records")
+
+
+def module_of(name: str) -> Any:
+    """The module of the figure ``name``; matplotlib waits until that draws."""
+    return import_module(f"koopcli.figures.{name.replace('-', '_')}")
+
+
+class _Folder(Mapping[str, "FigureKind"]):
+    """Figures by name, each read from its file when it is asked for."""
+
+    def __getitem__(self, name: str) -> "FigureKind":
+        if name not in self._names():
+            raise KeyError(name)
+        kind: FigureKind = module_of(name).FIGURE
+        return kind
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names())
+
+    def __len__(self) -> int:
+        return len(self._names())
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names()
+
+    @staticmethod
+    @cache
+    def _names() -> list[str]:
+        return sorted(path.stem.replace("_", "-") for path in Path(__file__).parent.glob("[!_.]*.py"))
+
+
+FIGURES = _Folder()
 
 
 @cache
@@ -23,7 +66,7 @@ def source_digest() -> str:
 def drawing_code() -> list[Path]:
     """The files of this package, then those elsewhere in koopcli that they import from."""
     here = Path(__file__).parent
-    own = sorted(here.glob("*.py"))
+    own = sorted(here.rglob("*.py"))
     taken = {
         name.replace(".", "/")
         for path in own

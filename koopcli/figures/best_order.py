@@ -3,20 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
+from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import COLOURS, PAPER
-from koopcli.figures.drawing import Source, column
+from koopcli.config.samples import GridSample
+from koopcli.errors import InvalidValueError
+from koopcli.figures.common.colours import COLOURS, PAPER
+from koopcli.figures.common.drawing import Source, column
+from koopcli.figures.common.kind import FigureKind, Recipes, Task
+from koopcli.figures.common.style import COLUMN, Figure, MaxNLocator, legend_below, style
 from koopcli.figures.orders import select as by_draw
-from koopcli.figures.style import COLUMN, legend_below, style
 from koopcli.records import Array
+
+
+def _sweep(recipes: Recipes, experiment: Experiment) -> list[Task]:
+    """One evaluation for each order of the sweep, on each of many random training grids."""
+    grid = experiment.sample("grid")
+    if not isinstance(grid, GridSample):
+        raise InvalidValueError("training draws are those of a grid: sample.kind must be 'grid'")
+    evaluations = []
+    for seed in range(experiment.reproduce.full_draws):
+        training = recipes.simulation(experiment, recipes.sample(replace(grid, seed=seed)))
+        for order in experiment.reproduce.orders:
+            fit = recipes.fit_edmd(recipes.with_order(experiment, order), training)
+            evaluations.append(recipes.evaluation(experiment, fit))
+    return evaluations
+
+
+FIGURE = FigureKind(
+    about="how often each order is the best, over training draws",
+    takes="evaluation",
+    draws="points",
+    makes=_sweep,
+    fit="fit-edmd",
+    reads=("reproduce.orders", "reproduce.full_draws"),
+    fixed=("fit-edmd.order", "sample.seed", "sample.grid.seed", "reproduce.draw"),
+    instead="it sweeps reproduce.orders over reproduce.full_draws random grids",
+)
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import BAND, COLOURS
-from koopcli.figures.drawing import Source, column, with_error
-from koopcli.figures.style import COLUMN, legend_below, plain_numbers, style
+from koopcli.figures.common.colours import BAND, COLOURS
+from koopcli.figures.common.drawing import Source, column, with_error
+from koopcli.figures.common.kind import FigureKind
+from koopcli.figures.common.style import COLUMN, Figure, legend_below, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray
+
+FIGURE = FigureKind(
+    about="RMSE against the distance of the initial state to the data",
+    takes="evaluation",
+    fit="fit-eigen",
+    follows=True,
+)
 
 BINS, FEWEST = 20, 20  # of distance, even; trajectories that a group of them has at least
 QUANTILES = (0.1, 0.25, 0.5, 0.75, 0.9)

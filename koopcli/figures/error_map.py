@@ -6,18 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
-from mpl_toolkits.mplot3d import Axes3D
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.balls import Balls, balls, columns
-from koopcli.figures.colours import SHADES
-from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, axis_label, in_space, style, symbol
+from koopcli.figures.common.balls import Balls, balls, columns
+from koopcli.figures.common.colours import SHADES
+from koopcli.figures.common.drawing import Source, column
+from koopcli.figures.common.kind import FigureKind
+from koopcli.figures.common.style import COLUMN, Figure, MaxNLocator, axis_label, in_space, style, symbol
 from koopcli.records import Array, FloatArray
+
+FIGURE = FigureKind(
+    about="RMSE by initial state: its mean over a slice, and every state in space",
+    takes="evaluation",
+    fit="fit-eigen",
+    follows=True,
+)
 
 PALEST = 0.2  # opacity of a ball without error
 ACROSS, UP, THROUGH = 0, 2, 1  # the states of the slice, and the one that it is thin in
@@ -89,6 +92,10 @@ FROM_TO = ((0, "from"), (1, "to"))
 
 def draw(shown: ErrorMap) -> Figure:
     """The slice large; beside it all states in space, the paler the smaller the error, in the same colours."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from mpl_toolkits.mplot3d import Axes3D
+
     seen = shown.balls
     names = [axis_label(n, u) for n, u in zip(seen.channels.names, seen.channels.units, strict=True)]
     scale = Normalize(0, seen.top)

@@ -6,16 +6,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.balls import Balls, balls, columns
-from koopcli.figures.colours import SHADES, TRAINING
-from koopcli.figures.drawing import Source, column, state_columns
-from koopcli.figures.style import COLUMN, axis_label, legend_below, style
+from koopcli.figures.common.balls import Balls, balls, columns
+from koopcli.figures.common.colours import SHADES, TRAINING
+from koopcli.figures.common.drawing import Source, column, state_columns
+from koopcli.figures.common.kind import FigureKind
+from koopcli.figures.common.style import COLUMN, Figure, axis_label, legend_below, style
 from koopcli.koopman.predictor.coverage import spread
 from koopcli.records import Array, FloatArray, Trajectories
+
+FIGURE = FigureKind(
+    about="RMSE by initial state from the side, over the training trajectories",
+    takes="evaluation",
+    behind=("training",),
+    fit="fit-eigen",
+    follows=True,
+)
 
 PATHS, STARTS = 500, 20_000  # training trajectories, or states of single steps, drawn at most
 SIDE = [1, 2]  # the states of the plane
@@ -49,6 +56,8 @@ def numbers(shown: ErrorSide) -> Mapping[str, Array]:
 
 def draw(shown: ErrorSide) -> Figure:
     """One plane."""
+    from matplotlib.collections import LineCollection
+
     seen, channels = shown.balls, shown.balls.channels
     i, j = SIDE
     with style():

@@ -6,13 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import COLOURS
-from koopcli.figures.drawing import Source, column, state_columns, with_error
-from koopcli.figures.style import COLUMN, axis_label, style
+from koopcli.figures.common.colours import COLOURS
+from koopcli.figures.common.drawing import Source, column, state_columns, with_error
+from koopcli.figures.common.kind import FigureKind
+from koopcli.figures.common.style import COLUMN, Figure, axis_label, style
 from koopcli.records import Array, Channels, FloatArray, Trajectories
+
+FIGURE = FigureKind(
+    about="the test trajectory whose RMSE is nearest the mean, true and predicted",
+    takes="evaluation",
+    behind=("predictor", "trajectories"),
+    fit="fit-eigen",
+    follows=True,
+)
 
 
 @dataclass(frozen=True)

@@ -3,19 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
+from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.colours import MARKERS
-from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
+from koopcli.figures.common.colours import MARKERS
+from koopcli.figures.common.drawing import Source, column
+from koopcli.figures.common.kind import FigureKind, Recipes, Task
+from koopcli.figures.common.style import COLUMN, Figure, MaxNLocator, legend_below, looks, plain, plain_numbers, style
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.records import Array, FloatArray
+
+
+def _sweep(recipes: Recipes, experiment: Experiment) -> list[Task]:
+    """One evaluation for each number of rates, of every kind; the best boundary values unless windows are fitted."""
+    fit = experiment.fit_eigen
+    if fit.window != "horizon":
+        fit = replace(fit, boundary="optimal")
+    fits = recipes.mode_fits(fit, experiment.reproduce.pairs)
+    return [recipes.evaluation(experiment, recipes.fit_eigen(replace(experiment, fit_eigen=fit))) for fit in fits]
+
+
+FIGURE = FigureKind(
+    about="what the fit misses, and RMSE, against the number of rates",
+    takes="evaluation",
+    behind=("predictor",),
+    draws="points",
+    against="modes",
+    makes=_sweep,
+    fit="fit-eigen",
+    reads=("reproduce.pairs",),
+    fixed=("fit-eigen.eigenvalues", "fit-eigen.pairs", "fit-eigen.degree"),
+    instead="it sweeps the degree of the lattice and reproduce.pairs",
+)
 
 
 @dataclass(frozen=True)

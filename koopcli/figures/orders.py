@@ -8,16 +8,37 @@ from itertools import cycle
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
+from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
 from koopcli.config.pictures import Plot
+from koopcli.config.settings import OF_BASIS
 from koopcli.errors import InvalidValueError
-from koopcli.figures.colours import COLOURS, MARKERS, PAPER
-from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, legend_below, plain_numbers, style
+from koopcli.figures.common.colours import COLOURS, MARKERS, PAPER
+from koopcli.figures.common.drawing import Source, column
+from koopcli.figures.common.kind import FigureKind, Recipes, Task
+from koopcli.figures.common.style import COLUMN, Figure, MaxNLocator, legend_below, plain_numbers, style
 from koopcli.records import Array, FloatArray
+
+
+def _sweep(recipes: Recipes, experiment: Experiment) -> list[Task]:
+    """One evaluation for each order of the experiment's sweep. Raises ``InvalidValueError`` for a basis without any."""
+    if "order" not in OF_BASIS[experiment.fit_edmd.basis]:
+        raise InvalidValueError(f"the basis '{experiment.fit_edmd.basis}' has no order to sweep: choose polynomials")
+    fits = (recipes.fit_edmd(recipes.with_order(experiment, order)) for order in experiment.reproduce.orders)
+    return [recipes.evaluation(experiment, fit) for fit in fits]
+
+
+FIGURE = FigureKind(
+    about="RMSE against the order of the basis, beside the paper's best",
+    takes="evaluation",
+    draws="points",
+    makes=_sweep,
+    fit="fit-edmd",
+    reads=("reproduce.orders",),
+    fixed=("fit-edmd.order", "reproduce.draw", "reproduce.excitations"),
+    instead="it sweeps reproduce.orders with sample.draw and test.excitation",
+)
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import COLOURS
-from koopcli.figures.drawing import LOST, Source, column, with_error
-from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
+from koopcli.figures.common.colours import COLOURS
+from koopcli.figures.common.drawing import LOST, Source, column, with_error
+from koopcli.figures.common.kind import FigureKind
+from koopcli.figures.common.style import COLUMN, Figure, legend_below, looks, plain, plain_numbers, style
 from koopcli.records import Array, FloatArray
+
+FIGURE = FigureKind(
+    about="how the RMSE of the trajectories is distributed",
+    takes="evaluation",
+    draws="beside",
+    fit="fit-eigen",
+    follows=True,
+)
 
 BINS = 40
 NARROWEST = 1.5  # ratio of the largest and the smallest RMSE of the bins

@@ -6,18 +6,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter, SymmetricalLogLocator
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import COLOURS, GUIDE
-from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, legend_below, style
+from koopcli.figures.common.colours import COLOURS, GUIDE
+from koopcli.figures.common.drawing import Source, column
+from koopcli.figures.common.kind import FigureKind
+from koopcli.figures.common.style import COLUMN, Axes, Figure, MaxNLocator, legend_below, style
 from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
 from koopcli.koopman.predictor.modes import ComplexArray
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.records import Array, FloatArray
+
+FIGURE = FigureKind(
+    about="damping of the modes of a predictor against their frequency",
+    takes="fit",
+    fit="fit-edmd",
+    follows=True,
+)
 
 ROUNDING = 1e-9  # of an eigenvalue: one that is 1 neither grows nor decays
 DECADES = 4  # of damping that are drawn on a logarithmic axis; what is nearer to zero lies on a linear one
@@ -112,6 +117,8 @@ def draw(shown: Spectrum) -> Figure:
 
 def _damping_axis(axes: Axes, shown: Spectrum) -> None:
     """Damping, logarithmic to both sides of zero where it goes far."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter, SymmetricalLogLocator
+
     axes.set_yscale("symlog", linthresh=shown.linear)
     low, high = _stretched(shown.edges[[0, -1]], shown.linear)
     margin = 0.05 * (high - low)

@@ -7,15 +7,23 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
+from koopcli.figures.common.drawing import Source, column
+from koopcli.figures.common.kind import FigureKind
+from koopcli.figures.common.style import COLUMN, Figure, MaxNLocator, legend_below, looks, plain, plain_numbers, style
 from koopcli.koopman.scores.swept import REPEATS, Swept
 from koopcli.records import Array, FloatArray
+
+FIGURE = FigureKind(
+    about="RMSE over a swept grid of settings",
+    takes="sweep",
+    fit="fit-edmd",
+    reads=("reproduce.orders", "reproduce.draw_seeds"),
+    fixed=("fit-edmd.order", "sample.seed", "sample.grid.seed", "reproduce.draws"),
+    instead="it sweeps reproduce.orders over reproduce.draw_seeds; koop sweep sweeps anything",
+)
 
 MOST = 12  # curves that can be told apart
 WIDE = 100  # ratio of the ends of an axis from which on it is logarithmic

@@ -6,16 +6,35 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
-from koopcli.config.pictures import Plot
+from koopcli.config.driving import ManoeuvreSample
+from koopcli.config.experiment import Experiment
+from koopcli.config.pictures import Cone, Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.colours import COLOURS
-from koopcli.figures.drawing import Source, column, state_columns
-from koopcli.figures.style import COLUMN, SMALLEST, axis_label, looks, style, symbol
+from koopcli.figures.common.colours import COLOURS
+from koopcli.figures.common.drawing import Source, column, state_columns
+from koopcli.figures.common.kind import FigureKind, Recipes, Task
+from koopcli.figures.common.style import COLUMN, SMALLEST, Axes, Figure, MaxNLocator, axis_label, looks, style, symbol
 from koopcli.records import ENDS, Array, Channels, FloatArray, Trajectories
+from koopcli.simulation.manoeuvres import MANOEUVRES
+
+
+def _cones(recipes: Recipes, experiment: Experiment, artefacts: Sequence[Task]) -> tuple[Cone, ...]:
+    """Those of the manoeuvre that the trajectories drive, where it has any; to the other side for a negative scale."""
+    samples = [sample.settings for task in artefacts if (sample := task.find("sample")) is not None]
+    driven = [settings for settings in samples if isinstance(settings, ManoeuvreSample)]
+    return tuple(Cone(X, Y if one.scale >= 0 else -Y) for one in driven for X, Y in MANOEUVRES[one.name].cones)
+
+
+FIGURE = FigureKind(
+    about="one simulated trajectory: course, states and inputs",
+    takes="trajectories",
+    told={
+        "trajectory": lambda recipes, experiment, artefacts: experiment.plot.trajectory,
+        "cones": _cones,
+    },
+    makes=lambda recipes, experiment: [recipes.simulation(experiment, recipes.sample(experiment.sample("manoeuvre")))],
+)
 
 RIM = {"wheel_rate_f": "front", "wheel_rate_r": "rear"}
 HEADINGS = 12  # cars drawn along the course

@@ -19,9 +19,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from koopcli.config.pictures import ImageFormat
 from koopcli.config.shipped import called
 from koopcli.errors import InvalidValueError
-from koopcli.figures import style
-from koopcli.figures.colours import COLOURS
-from koopcli.figures.drawing import Drawing, sources_of
+from koopcli.figures.common import style
+from koopcli.figures.common.colours import COLOURS
+from koopcli.figures.common.drawing import Drawing, sources_of
 from koopcli.figures.registry import FIGURES, drawing
 from koopcli.stages.drawn import MADE, TAKES, TOLD
 from tests.stages.toys import figure_records, figure_settings

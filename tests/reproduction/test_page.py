@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from koopcli.figures.drawing import Drawing
+from koopcli.figures.common.drawing import Drawing
 from koopcli.figures.registry import FIGURES, drawing
 from koopcli.koopman.scores import metrics
 from koopcli.reproduction.illustrations import Illustration

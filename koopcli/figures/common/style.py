@@ -5,19 +5,26 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from importlib import import_module
 from textwrap import fill, wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from matplotlib import style as matplotlib_style
-from matplotlib.axis import Axis
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
-from matplotlib.transforms import Bbox
-from mpl_toolkits.mplot3d import Axes3D
-
-from koopcli.figures.colours import COLOURS, DASHES, GUIDE
-from koopcli.figures.signature import LONGEST
+from koopcli.figures.common.colours import COLOURS, DASHES, GUIDE
+from koopcli.figures.common.signature import LONGEST
 from koopcli.text import printable
+
+if TYPE_CHECKING:
+    from matplotlib import axes, axis, figure, ticker
+    from mpl_toolkits.mplot3d import Axes3D
+
+    Axes, Axis, Figure, MaxNLocator = axes.Axes, axis.Axis, figure.Figure, ticker.MaxNLocator
+else:  # what most figures use of matplotlib, imported when the first one is drawn; they import the rest where they draw
+
+    def _waiting(module: str, name: str) -> Any:
+        return lambda *given, **named: getattr(import_module(module), name)(*given, **named)
+
+    Axes = Axis = Any
+    Figure, MaxNLocator = _waiting("matplotlib.figure", "Figure"), _waiting("matplotlib.ticker", "MaxNLocator")
 
 COLUMN = 3.5  # inches, one column of a two-column page
 DOTS = 300  # per inch, of a png
@@ -83,6 +90,8 @@ def legend_below(figure: Figure, title: str | None = None, columns: int = 2, **l
 
 def plain_numbers(axis: Axis) -> None:
     """Numbers on a logarithmic axis as people write them, 0.1 and 20 rather than powers of ten."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
     low, high = axis.get_view_interval()
     if high < NARROW * low:
         axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -115,7 +124,9 @@ def axis_label(name: str, unit: str) -> str:
 
 def style() -> AbstractContextManager[None]:
     """The style for the time of a ``with``, over matplotlib's own defaults: a user's matplotlibrc changes nothing."""
-    return matplotlib_style.context(["default", STYLE])
+    from matplotlib import style as of_matplotlib
+
+    return of_matplotlib.context(["default", STYLE])
 
 
 UNDATED: dict[str, dict[str, None]] = {
@@ -129,6 +140,8 @@ def render(figure: Figure, image: str, line: str) -> bytes:
     """The figure as a png, svg or pdf file, with a grey ``line`` in a strip of its own below all that is drawn; the
     same figure gives the same bytes.
     """
+    from matplotlib.transforms import Bbox
+
     target = io.BytesIO()
     lines = wrap(line, LONGEST)
     width, height = figure.get_size_inches()

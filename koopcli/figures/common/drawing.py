@@ -13,6 +13,9 @@ import numpy.typing as npt
 from koopcli.config.pictures import Plot, Series
 from koopcli.content import Content
 from koopcli.errors import InvalidValueError
+from koopcli.figures import module_of
+from koopcli.figures.common import style
+from koopcli.figures.common.signature import signature
 from koopcli.records import Array, BoolArray, Channels, FloatArray, Packed
 
 LOST = " (all diverged)"  # after the name of one among several that has no error to draw
@@ -69,6 +72,14 @@ class Drawing(Content):
             numbers,
             packed.arrays["image"].values[...].tobytes(),
         )
+
+
+def drawing(settings: Plot, inputs: Mapping[str, Any], version: str = "") -> Drawing:
+    """The figure that ``settings`` ask for, from records by ``number/role``, as this ``version`` of koop draws it."""
+    module = module_of(settings.figure)
+    shown = module.select(sources_of(settings, inputs), settings)
+    image = style.render(module.draw(shown), settings.format, signature(settings.of, version))
+    return Drawing(settings.figure, settings.format, module.numbers(shown), image)
 
 
 def column(values: npt.ArrayLike, axis: str, unit: str) -> Array:
