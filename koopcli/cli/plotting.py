@@ -14,10 +14,10 @@ from koopcli.cli.outputs import STDOUT, CsvOption, OutputOption, check_outputs, 
 from koopcli.config.changes import SECTIONS, flat
 from koopcli.console import show_table
 from koopcli.errors import UnknownNameError, UsageError
-from koopcli.figures import FIGURES
+from koopcli.figures import NAMES
 
 if TYPE_CHECKING:
-    from koopcli.figures.common.kind import FigureKind
+    from koopcli.figures.kit.figure import FigureKind
     from koopcli.stages.base import Task
     from koopcli.stages.pipeline import Artefact
 
@@ -53,13 +53,13 @@ def plot(
         _list(as_json=as_json)
         return
     if figure is None:
-        raise UsageError(f"which figure? Name one of: {', '.join(FIGURES)}")
-    if figure not in FIGURES:
-        raise UnknownNameError(f"unknown figure '{figure}'{candidates(figure, FIGURES)}")
+        raise UsageError(f"which figure? Name one of: {', '.join(NAMES)}")
+    if figure not in NAMES:
+        raise UnknownNameError(f"unknown figure '{figure}'{candidates(figure, NAMES)}")
     image = image_format(output)
     check_outputs(output, csv_, as_json=as_json)
     call = begin(store, experiment, set_, SECTIONS)
-    from koopcli.figures.common.kind import TAKES
+    from koopcli.figures.kit.registry import FIGURES
     from koopcli.stages import figure_tasks, recipes
 
     kind = FIGURES[figure]
@@ -67,7 +67,7 @@ def plot(
         raise UsageError(f"the figure '{figure}' draws no artefact: leave out {' '.join(artefacts)}")
     if artefacts:
         told = figure_tasks.TOLD_BESIDE if kind.takes == "predictor" else ("plot",) if kind.told else ()
-        sources = [call.named(one, TAKES[kind.takes], f"what '{figure}' draws", told) for one in artefacts]
+        sources = [call.named(one, kind.stages, f"what '{figure}' draws", told) for one in artefacts]
     else:
         for name, _ in flat(call.changes):
             if kind.chooses(name, call.experiment):
@@ -81,7 +81,7 @@ def plot(
             call.console.note("add -o FILE.png, .svg or .pdf to write the image, --csv FILE for its numbers")
 
     task = figure_tasks.figure(figure, sources, image, call.experiment, call.simulated, labels)
-    reads = (*kind.uses, *(recipes.CHOSEN if kind.fit is not None and not artefacts else ()))
+    reads = (*kind.uses, *(recipes.CHOSEN if (kind.usual or kind.only) and not artefacts else ()))
     call.run(task, as_json=as_json, dry_run=dry_run, extra=export, reads=reads, table_out=csv_ == STDOUT)
 
 
@@ -97,6 +97,8 @@ def _labels(given: list[str] | None, sources: list[Task], kind: FigureKind) -> d
 
 
 def _list(*, as_json: bool) -> None:
+    from koopcli.figures.kit.registry import FIGURES
+
     if as_json:
         print_json({name: {"shows": kind.about, "takes": kind.takes} for name, kind in FIGURES.items()})
         return

@@ -6,49 +6,19 @@
 
 import hashlib
 import re
-from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from koopcli.figures.common.kind import FigureKind
+from typing import Any
 
 # what is taken of these is data, not something drawn
 PLAIN = ("config/experiment", "config/samples", "config/settings", "errors", "records")
+NAMES = sorted(path.stem.replace("_", "-") for path in Path(__file__).parent.glob("[!_.]*.py"))
 
 
 def module_of(name: str) -> Any:
     """The module of the figure ``name``; matplotlib waits until that draws."""
     return import_module(f"koopcli.figures.{name.replace('-', '_')}")
-
-
-class _Folder(Mapping[str, "FigureKind"]):
-    """Figures by name, each read from its file when it is asked for."""
-
-    def __getitem__(self, name: str) -> "FigureKind":
-        if name not in self._names():
-            raise KeyError(name)
-        kind: FigureKind = module_of(name).FIGURE
-        return kind
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names())
-
-    def __len__(self) -> int:
-        return len(self._names())
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._names()
-
-    @staticmethod
-    @cache
-    def _names() -> list[str]:
-        return sorted(path.stem.replace("_", "-") for path in Path(__file__).parent.glob("[!_.]*.py"))
-
-
-FIGURES = _Folder()
 
 
 @cache

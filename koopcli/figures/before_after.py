@@ -11,11 +11,9 @@ import numpy as np
 from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Plot
 from koopcli.config.settings import FitEigen
-from koopcli.figures.common.balls import LARGEST_SHOWN
-from koopcli.figures.common.colours import SHADES
-from koopcli.figures.common.drawing import LOST, Source, column, state_columns, with_error
-from koopcli.figures.common.kind import FigureKind, Recipes, Task
-from koopcli.figures.common.style import COLUMN, Figure, MaxNLocator, axis_label, plain, plain_numbers, style
+from koopcli.figures.kit.balls import LARGEST_SHOWN
+from koopcli.figures.kit.figure import LOST, FigureKind, Recipes, Source, Task, column, state_columns, with_error
+from koopcli.figures.kit.style import COLUMN, SHADES, Figure, axis_label, plain, plain_numbers, style, ticks
 from koopcli.koopman.scores.evaluation import Evaluation
 from koopcli.records import Array, Channels, FloatArray
 
@@ -35,7 +33,7 @@ FIGURE = FigureKind(
     takes="evaluation",
     draws="beside",
     makes=_improved,
-    fit="fit-eigen",
+    only="fit-eigen",
     reads=("reproduce.budgets",),
     fixed=("fit-eigen.",),
     instead="it sets the paper's reading beside the experiment best-eigen; name evaluations to choose others",
@@ -101,7 +99,7 @@ def draw(shown: Sequence[Errors]) -> Figure:
             for axes, (across, up) in zip(column_, VIEWS, strict=True):
                 at = one.x0[:, across], one.x0[:, up]
                 axes.scatter(*at, s=3, color=colours, linewidths=0, zorder=3, rasterized=True)
-                axes.xaxis.set_major_locator(MaxNLocator(4))
+                ticks(axes.xaxis, 4)
         for row, (across, up) in zip(panels, VIEWS, strict=True):
             row[0].set_ylabel(names[up])
             for axes in row:

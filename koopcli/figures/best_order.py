@@ -13,10 +13,8 @@ from koopcli.config.paper import BEST_ORDERS
 from koopcli.config.pictures import Plot
 from koopcli.config.samples import GridSample
 from koopcli.errors import InvalidValueError
-from koopcli.figures.common.colours import COLOURS, PAPER
-from koopcli.figures.common.drawing import Source, column
-from koopcli.figures.common.kind import FigureKind, Recipes, Task
-from koopcli.figures.common.style import COLUMN, Figure, MaxNLocator, legend_below, style
+from koopcli.figures.kit.figure import FigureKind, Recipes, Source, Task, column
+from koopcli.figures.kit.style import COLOURS, COLUMN, PAPER, Figure, legend_below, style, ticks
 from koopcli.figures.orders import select as by_draw
 from koopcli.records import Array
 
@@ -40,7 +38,7 @@ FIGURE = FigureKind(
     takes="evaluation",
     draws="points",
     makes=_sweep,
-    fit="fit-edmd",
+    only="fit-edmd",
     reads=("reproduce.orders", "reproduce.full_draws"),
     fixed=("fit-edmd.order", "sample.seed", "sample.grid.seed", "reproduce.draw"),
     instead="it sweeps reproduce.orders over reproduce.full_draws random grids",
@@ -79,7 +77,7 @@ def draw(shown: BestOrders) -> Figure:
         there = [order for order in BEST_ORDERS if order in shown.orders]
         axes.plot(there, [0.0] * len(there), "^", color=PAPER, clip_on=False, zorder=5, label="the paper's best orders")
         axes.set_xticks(shown.orders)
-        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+        ticks(axes.yaxis, integer=True)
         axes.set_xlabel("order of the polynomial basis")
         axes.set_ylabel("training draws (1)")
         legend_below(figure)

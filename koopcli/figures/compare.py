@@ -9,10 +9,8 @@ from textwrap import fill
 import numpy as np
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.common.colours import COLOURS
-from koopcli.figures.common.drawing import Source, column, with_error
-from koopcli.figures.common.kind import FigureKind
-from koopcli.figures.common.style import COLUMN, LINE, Figure, plain, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Source, column, with_error
+from koopcli.figures.kit.style import COLOURS, COLUMN, LINE, Figure, plain, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray
 
 FIGURE = FigureKind(
@@ -20,8 +18,7 @@ FIGURE = FigureKind(
     takes="evaluation",
     draws="beside",
     makes=lambda recipes, experiment: recipes.side_by_side(experiment),
-    fit="fit-eigen",
-    follows=True,
+    usual="fit-eigen",
     fixed=("fit-edmd.", "baseline."),
     instead="it sets one predictor beside fixed baselines and EDMD fits; name evaluations to choose others",
 )

@@ -9,17 +9,14 @@ from typing import Any
 import numpy as np
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.common.colours import BAND, COLOURS
-from koopcli.figures.common.drawing import Source, column, with_error
-from koopcli.figures.common.kind import FigureKind
-from koopcli.figures.common.style import COLUMN, Figure, legend_below, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Source, column, with_error
+from koopcli.figures.kit.style import BAND, COLOURS, COLUMN, Figure, legend_below, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray
 
 FIGURE = FigureKind(
     about="RMSE against the distance of the initial state to the data",
     takes="evaluation",
-    fit="fit-eigen",
-    follows=True,
+    usual="fit-eigen",
 )
 
 BINS, FEWEST = 20, 20  # of distance, even; trajectories that a group of them has at least

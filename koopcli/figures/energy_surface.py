@@ -10,10 +10,8 @@ import numpy as np
 
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.common.colours import COLOURS, GUIDE
-from koopcli.figures.common.drawing import Source, column, state_columns
-from koopcli.figures.common.kind import FigureKind
-from koopcli.figures.common.style import COLUMN, Figure, axis_label, in_space, style
+from koopcli.figures.kit.figure import FigureKind, Source, column, state_columns
+from koopcli.figures.kit.style import COLOURS, COLUMN, GUIDE, Figure, axis_label, in_space, style
 from koopcli.records import Array, Channels, FloatArray, Sample
 from koopcli.simulation.sampling import sphere_mesh
 

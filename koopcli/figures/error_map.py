@@ -8,18 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.common.balls import Balls, balls, columns
-from koopcli.figures.common.colours import SHADES
-from koopcli.figures.common.drawing import Source, column
-from koopcli.figures.common.kind import FigureKind
-from koopcli.figures.common.style import COLUMN, Figure, MaxNLocator, axis_label, in_space, style, symbol
+from koopcli.figures.kit.balls import Balls, balls, columns
+from koopcli.figures.kit.figure import FigureKind, Source, column
+from koopcli.figures.kit.style import COLUMN, SHADES, Figure, axis_label, in_space, style, symbol, ticks
 from koopcli.records import Array, FloatArray
 
 FIGURE = FigureKind(
     about="RMSE by initial state: its mean over a slice, and every state in space",
     takes="evaluation",
-    fit="fit-eigen",
-    follows=True,
+    usual="fit-eigen",
 )
 
 PALEST = 0.2  # opacity of a ball without error
@@ -118,7 +115,7 @@ def draw(shown: ErrorMap) -> Figure:
         in_space(space, [symbol(name) for name in seen.channels.names], zoom=1.08)
         space.set_title("every state", fontsize=8)
         for axis in (space.xaxis, space.yaxis, space.zaxis):
-            axis.set_major_locator(MaxNLocator(2))
+            ticks(axis, 2)
             axis.set_ticklabels([])
             axis.labelpad = -17
             axis.set_rotate_label(axis is space.zaxis)

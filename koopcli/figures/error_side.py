@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.common.balls import Balls, balls, columns
-from koopcli.figures.common.colours import SHADES, TRAINING
-from koopcli.figures.common.drawing import Source, column, state_columns
-from koopcli.figures.common.kind import FigureKind
-from koopcli.figures.common.style import COLUMN, Figure, axis_label, legend_below, style
+from koopcli.figures.kit.balls import Balls, balls, columns
+from koopcli.figures.kit.figure import FigureKind, Source, column, state_columns
+from koopcli.figures.kit.style import COLUMN, SHADES, TRAINING, Figure, axis_label, legend_below, style
 from koopcli.koopman.predictor.coverage import spread
 from koopcli.records import Array, FloatArray, Trajectories
 
@@ -20,8 +18,7 @@ FIGURE = FigureKind(
     about="RMSE by initial state from the side, over the training trajectories",
     takes="evaluation",
     behind=("training",),
-    fit="fit-eigen",
-    follows=True,
+    usual="fit-eigen",
 )
 
 PATHS, STARTS = 500, 20_000  # training trajectories, or states of single steps, drawn at most

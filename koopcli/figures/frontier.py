@@ -11,10 +11,8 @@ from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Plot
 from koopcli.config.samples import GreedySample
 from koopcli.errors import InvalidValueError
-from koopcli.figures.common.colours import MARKERS
-from koopcli.figures.common.drawing import Source, column
-from koopcli.figures.common.kind import FigureKind, Recipes, Task
-from koopcli.figures.common.style import COLUMN, Figure, legend_below, looks, plain, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Recipes, Source, Task, column
+from koopcli.figures.kit.style import COLUMN, MARKERS, Figure, legend_below, looks, plain, plain_numbers, style
 from koopcli.records import Array, FloatArray
 
 
@@ -42,7 +40,7 @@ FIGURE = FigureKind(
     draws="points",
     against="seconds",
     makes=_sweep,
-    fit="fit-eigen",
+    only="fit-eigen",
     reads=("reproduce.budgets", "reproduce.beside"),
     fixed=("fit-eigen.", "sample."),
     instead="it draws the experiment best-eigen on reproduce.budgets; name evaluations to choose others",

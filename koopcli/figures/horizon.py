@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.common.colours import BAND, COLOURS, DASHES, OTHERS
-from koopcli.figures.common.drawing import LOST, Source, column, with_error
-from koopcli.figures.common.ends import End, name_ends, room_for
-from koopcli.figures.common.kind import FigureKind
-from koopcli.figures.common.style import COLUMN, Figure, plain, plain_numbers, style
+from koopcli.figures.kit.ends import End, name_ends, room_for
+from koopcli.figures.kit.figure import LOST, FigureKind, Source, column, with_error
+from koopcli.figures.kit.style import BAND, COLOURS, COLUMN, DASHES, OTHERS, Figure, plain, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray, Trajectories
 
 FIGURE = FigureKind(
@@ -22,8 +20,7 @@ FIGURE = FigureKind(
     behind=("predictor", "trajectories"),
     draws="beside",
     makes=lambda recipes, experiment: recipes.side_by_side(experiment),
-    fit="fit-eigen",
-    follows=True,
+    usual="fit-eigen",
     fixed=("fit-edmd.", "baseline."),
     instead="it sets one predictor beside fixed baselines and EDMD fits; name evaluations to choose others",
 )

@@ -8,18 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.common.colours import COLOURS
-from koopcli.figures.common.drawing import Source, column, state_columns, with_error
-from koopcli.figures.common.kind import FigureKind
-from koopcli.figures.common.style import COLUMN, Figure, axis_label, style
+from koopcli.figures.kit.figure import FigureKind, Source, column, state_columns, with_error
+from koopcli.figures.kit.style import COLOURS, COLUMN, Figure, axis_label, style
 from koopcli.records import Array, Channels, FloatArray, Trajectories
 
 FIGURE = FigureKind(
     about="the test trajectory whose RMSE is nearest the mean, true and predicted",
     takes="evaluation",
     behind=("predictor", "trajectories"),
-    fit="fit-eigen",
-    follows=True,
+    usual="fit-eigen",
 )
 
 

@@ -10,10 +10,8 @@ import numpy as np
 from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.common.colours import MARKERS
-from koopcli.figures.common.drawing import Source, column
-from koopcli.figures.common.kind import FigureKind, Recipes, Task
-from koopcli.figures.common.style import COLUMN, Figure, MaxNLocator, legend_below, looks, plain, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Recipes, Source, Task, column
+from koopcli.figures.kit.style import COLUMN, MARKERS, Figure, legend_below, looks, plain, plain_numbers, style, ticks
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.records import Array, FloatArray
 
@@ -34,7 +32,7 @@ FIGURE = FigureKind(
     draws="points",
     against="modes",
     makes=_sweep,
-    fit="fit-eigen",
+    only="fit-eigen",
     reads=("reproduce.pairs",),
     fixed=("fit-eigen.eigenvalues", "fit-eigen.pairs", "fit-eigen.degree"),
     instead="it sweeps the degree of the lattice and reproduce.pairs",
@@ -88,7 +86,7 @@ def draw(shown: Sequence[ModeErrors]) -> Figure:
             axes.set_yscale("log")
             plain_numbers(axes.yaxis)
             axes.set_ylabel(name)
-        prediction.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ticks(prediction.xaxis, integer=True)
         prediction.set_xlabel("modes of a state (1)")
         legend_below(figure, columns=3)
     return figure

@@ -14,10 +14,8 @@ from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
 from koopcli.config.pictures import Plot
 from koopcli.config.settings import OF_BASIS
 from koopcli.errors import InvalidValueError
-from koopcli.figures.common.colours import COLOURS, MARKERS, PAPER
-from koopcli.figures.common.drawing import Source, column
-from koopcli.figures.common.kind import FigureKind, Recipes, Task
-from koopcli.figures.common.style import COLUMN, Figure, MaxNLocator, legend_below, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Recipes, Source, Task, column
+from koopcli.figures.kit.style import COLOURS, COLUMN, MARKERS, PAPER, Figure, legend_below, plain_numbers, style, ticks
 from koopcli.records import Array, FloatArray
 
 
@@ -34,7 +32,7 @@ FIGURE = FigureKind(
     takes="evaluation",
     draws="points",
     makes=_sweep,
-    fit="fit-edmd",
+    only="fit-edmd",
     reads=("reproduce.orders",),
     fixed=("fit-edmd.order", "reproduce.draw", "reproduce.excitations"),
     instead="it sweeps reproduce.orders with sample.draw and test.excitation",
@@ -99,7 +97,7 @@ def draw(curves: Sequence[OrderErrors]) -> Figure:
         axes.plot(BEST_ORDERS, points, "x", color=PAPER, markersize=6, markeredgewidth=1.4, label=label, zorder=5)
         axes.set_yscale("log")
         plain_numbers(axes.yaxis)
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ticks(axes.xaxis, integer=True)
         axes.set_xlabel("order of the polynomial basis")
         axes.set_ylabel("RMSE (%)")
         legend_below(figure, title=curves[0].label if len(curves) == 1 else None)

@@ -9,10 +9,8 @@ import numpy as np
 
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.common.colours import COLOURS, GUIDE
-from koopcli.figures.common.drawing import Source, column, state_columns
-from koopcli.figures.common.kind import FigureKind
-from koopcli.figures.common.style import COLUMN, Figure, axis_label, style
+from koopcli.figures.kit.figure import FigureKind, Source, column, state_columns
+from koopcli.figures.kit.style import COLOURS, COLUMN, GUIDE, Figure, axis_label, style
 from koopcli.koopman.scores.metrics import rmse
 from koopcli.koopman.scores.restarts import restarted
 from koopcli.records import Array, Channels, FloatArray, Trajectories
@@ -22,8 +20,7 @@ FIGURE = FigureKind(
     takes="predictor",
     behind=("trajectories",),
     told={"restart": lambda recipes, experiment, artefacts: experiment.plot.restart},
-    fit="fit-edmd",
-    follows=True,
+    usual="fit-edmd",
 )
 
 MARKED = 15  # restarts that are marked by lines; more would hide what is drawn

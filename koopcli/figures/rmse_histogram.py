@@ -8,18 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.common.colours import COLOURS
-from koopcli.figures.common.drawing import LOST, Source, column, with_error
-from koopcli.figures.common.kind import FigureKind
-from koopcli.figures.common.style import COLUMN, Figure, legend_below, looks, plain, plain_numbers, style
+from koopcli.figures.kit.figure import LOST, FigureKind, Source, column, with_error
+from koopcli.figures.kit.style import COLOURS, COLUMN, Figure, legend_below, looks, plain, plain_numbers, style
 from koopcli.records import Array, FloatArray
 
 FIGURE = FigureKind(
     about="how the RMSE of the trajectories is distributed",
     takes="evaluation",
     draws="beside",
-    fit="fit-eigen",
-    follows=True,
+    usual="fit-eigen",
 )
 
 BINS = 40

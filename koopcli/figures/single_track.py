@@ -8,16 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.common.colours import COLOURS, GUIDE, PAPER
-from koopcli.figures.common.drawing import Source, column
-from koopcli.figures.common.kind import FigureKind
-from koopcli.figures.common.style import COLUMN, Axes, Figure, style
+from koopcli.figures.kit.figure import FigureKind, Source, column
+from koopcli.figures.kit.style import COLOURS, COLUMN, GUIDE, PAPER, Axes, Figure, style
 from koopcli.records import Array, FloatArray
 
-FIGURE = FigureKind(
-    about="the vehicle: states, forces and angles with their signs",
-    takes="nothing",
-)
+FIGURE = FigureKind(about="the vehicle: states, forces and angles with their signs", takes="nothing")
 
 FRONT, REAR = np.array([1.6, 0.0]), np.array([-1.6, 0.0])  # m, as all lengths here
 STEER = {"f": np.deg2rad(20.0), "r": np.deg2rad(-20.0)}

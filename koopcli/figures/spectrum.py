@@ -8,10 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.common.colours import COLOURS, GUIDE
-from koopcli.figures.common.drawing import Source, column
-from koopcli.figures.common.kind import FigureKind
-from koopcli.figures.common.style import COLUMN, Axes, Figure, MaxNLocator, legend_below, style
+from koopcli.figures.kit.figure import FigureKind, Source, column
+from koopcli.figures.kit.style import COLOURS, COLUMN, GUIDE, Axes, Figure, legend_below, style, ticks
 from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
 from koopcli.koopman.predictor.modes import ComplexArray
 from koopcli.koopman.predictor.predictor import Predictor
@@ -20,8 +18,7 @@ from koopcli.records import Array, FloatArray
 FIGURE = FigureKind(
     about="damping of the modes of a predictor against their frequency",
     takes="fit",
-    fit="fit-edmd",
-    follows=True,
+    usual="fit-edmd",
 )
 
 ROUNDING = 1e-9  # of an eigenvalue: one that is 1 neither grows nor decays
@@ -104,13 +101,13 @@ def draw(shown: Spectrum) -> Figure:
             axes.axhline(0, color=GUIDE, linewidth=0.8)
         fastest = max(SLOWEST, float(frequency.max(initial=0.0)))
         plane.set_xlim(-0.03 * fastest, 1.03 * fastest)  # room for rings at zero
-        plane.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        ticks(plane.xaxis, 5, steps=[1, 2, 5, 10])
         density.set_xlim(left=0)
         _damping_axis(plane, shown)
         plane.set_xlabel("frequency (Hz)")
         plane.set_ylabel("damping (1/s)")
         density.set_xlabel("number (1)")
-        density.xaxis.set_major_locator(MaxNLocator(2, integer=True))
+        ticks(density.xaxis, 2, integer=True)
         legend_below(figure, f"each {shown.copies} times" if shown.copies > 1 else None)
     return figure
 

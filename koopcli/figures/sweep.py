@@ -10,16 +10,15 @@ import numpy as np
 
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.common.drawing import Source, column
-from koopcli.figures.common.kind import FigureKind
-from koopcli.figures.common.style import COLUMN, Figure, MaxNLocator, legend_below, looks, plain, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Source, column
+from koopcli.figures.kit.style import COLUMN, Figure, legend_below, looks, plain, plain_numbers, style, ticks
 from koopcli.koopman.scores.swept import REPEATS, Swept
 from koopcli.records import Array, FloatArray
 
 FIGURE = FigureKind(
     about="RMSE over a swept grid of settings",
     takes="sweep",
-    fit="fit-edmd",
+    only="fit-edmd",
     reads=("reproduce.orders", "reproduce.draw_seeds"),
     fixed=("fit-edmd.order", "sample.seed", "sample.grid.seed", "reproduce.draws"),
     instead="it sweeps reproduce.orders over reproduce.draw_seeds; koop sweep sweeps anything",
@@ -117,7 +116,7 @@ def _along(axes: Any, shown: SweptErrors) -> None:
     elif at[0] >= 0 and at[-1] > WIDE * (least := at[at > 0][0]):
         axes.set_xscale("symlog", linthresh=least) if at[0] == 0 else axes.set_xscale("log")
     elif (at == np.round(at)).all():
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ticks(axes.xaxis, integer=True)
 
 
 def _axis(table: Swept) -> int:

@@ -11,10 +11,8 @@ from koopcli.config.driving import ManoeuvreSample
 from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Cone, Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.common.colours import COLOURS
-from koopcli.figures.common.drawing import Source, column, state_columns
-from koopcli.figures.common.kind import FigureKind, Recipes, Task
-from koopcli.figures.common.style import COLUMN, SMALLEST, Axes, Figure, MaxNLocator, axis_label, looks, style, symbol
+from koopcli.figures.kit.figure import FigureKind, Recipes, Source, Task, column, state_columns
+from koopcli.figures.kit.style import COLOURS, COLUMN, SMALLEST, Axes, Figure, axis_label, looks, style, symbol, ticks
 from koopcli.records import ENDS, Array, Channels, FloatArray, Trajectories
 from koopcli.simulation.manoeuvres import MANOEUVRES
 
@@ -203,7 +201,7 @@ def _draw_course(axes: Axes, shown: Path, stretched: float) -> None:
     axes.set_aspect(stretched, adjustable="datalim")
     axes.set_xlabel("X (m)")
     axes.set_ylabel("Y (m)" if stretched == 1 else f"Y, {stretched:g} : 1\n(m)")
-    axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+    ticks(axes.yaxis, 4, steps=[1, 2, 5, 10])
 
 
 def _draw_panel(axes: Axes, time: FloatArray, panel: _Panel) -> None:
@@ -212,7 +210,7 @@ def _draw_panel(axes: Axes, time: FloatArray, panel: _Panel) -> None:
     for (name, values), look in zip(moving.items(), looks(len(moving)), strict=True):
         axes.plot(time, values, drawstyle="steps-post" if panel.held else "default", label=symbol(name), **look)
     axes.set_ylabel(axis_label(panel.name, panel.unit).replace(" (", "\n("))
-    axes.yaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
+    ticks(axes.yaxis, 3, steps=[1, 2, 5, 10])
     if len(moving) > 1:
         axes.legend(
             loc="lower right",

@@ -9,10 +9,8 @@ import numpy as np
 
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.common.colours import COLOURS, GUIDE
-from koopcli.figures.common.drawing import Source, column, with_error
-from koopcli.figures.common.kind import FigureKind
-from koopcli.figures.common.style import COLUMN, Figure, legend_below, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Source, column, with_error
+from koopcli.figures.kit.style import COLOURS, COLUMN, GUIDE, Figure, legend_below, plain_numbers, style
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.koopman.scores.evaluation import Evaluation
 from koopcli.records import Array, FloatArray
@@ -24,7 +22,7 @@ FIGURE = FigureKind(
     makes=lambda recipes, experiment: [
         recipes.evaluation(experiment, recipes.fit_eigen(recipes.best_eigen(experiment)))
     ],
-    fit="fit-eigen",
+    only="fit-eigen",
     reads=("reproduce.budgets",),
     fixed=("fit-eigen.", "sample."),
     instead="it draws the experiment best-eigen; name an evaluation to choose another",

@@ -10,10 +10,8 @@ import numpy as np
 from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Plot, Tyres
 from koopcli.errors import InvalidValueError
-from koopcli.figures.common.colours import GUIDE
-from koopcli.figures.common.drawing import Source, column
-from koopcli.figures.common.kind import FigureKind, Recipes, Task
-from koopcli.figures.common.style import COLUMN, Figure, legend_below, looks, plain, style
+from koopcli.figures.kit.figure import FigureKind, Recipes, Source, Task, column
+from koopcli.figures.kit.style import COLUMN, GUIDE, Figure, legend_below, looks, plain, style
 from koopcli.records import Array, FloatArray
 from koopcli.vehicles.handling import tyres_of, wheel_loads
 from koopcli.vehicles.parameters import TYRES

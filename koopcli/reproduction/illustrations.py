@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 from koopcli.config.changes import flat, parse_set
 from koopcli.errors import InvalidValueError, UsageError
-from koopcli.figures import FIGURES
-from koopcli.figures.common.drawing import Drawing
-from koopcli.figures.common.kind import FigureKind
+from koopcli.figures.kit.figure import Drawing, FigureKind
+from koopcli.figures.kit.registry import FIGURES
 from koopcli.reproduction.report import Picture, Plan, Run
 from koopcli.stages import figure_tasks
 from koopcli.stages.base import Task

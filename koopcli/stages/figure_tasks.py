@@ -10,8 +10,9 @@ from koopcli.config.pictures import ImageFormat, Plot, Series
 from koopcli.config.samples import SAMPLED_FOR
 from koopcli.config.settings import Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError
-from koopcli.figures import FIGURES, source_digest
-from koopcli.figures.common.kind import FigureKind
+from koopcli.figures import source_digest
+from koopcli.figures.kit.figure import FigureKind
+from koopcli.figures.kit.registry import FIGURES
 from koopcli.stages import grid, recipes
 from koopcli.stages.base import Task
 from koopcli.stages.naming import names, points
@@ -27,10 +28,10 @@ def artefacts(name: str, experiment: Experiment) -> list[Task]:
     Raises ``InvalidValueError`` for an experiment about a fit that the figure is not for.
     """
     kind, about = FIGURES[name], experiment.about.fit
-    if kind.fit is not None and not kind.follows and about not in (None, kind.fit):
+    if kind.only is not None and about not in (None, kind.only):
         raise InvalidValueError(
-            f"the figure makes {kind.fit} predictors, the experiment is about {about}: name what to draw, or add "
-            f"--set experiment.fit={kind.fit}"
+            f"the figure makes {kind.only} predictors, the experiment is about {about}: name what to draw, or add "
+            f"--set experiment.fit={kind.only}"
         )
     if kind.makes is not None:
         return kind.makes(recipes, experiment)
@@ -38,7 +39,7 @@ def artefacts(name: str, experiment: Experiment) -> list[Task]:
         return []
     if kind.takes == "sweep":
         return [grid.order_grid(experiment)]
-    predictor = recipes.predictor(experiment, kind.fit or "fit-edmd")
+    predictor = recipes.predictor(experiment, kind.usual or kind.only or "fit-edmd")
     return [recipes.evaluation(experiment, predictor) if kind.takes == "evaluation" else predictor]
 
 

@@ -6,7 +6,7 @@ from typing import get_args, get_type_hints
 
 import pytest
 
-from koopcli.config import driving, pictures, plants, sampled, samples, settings
+from koopcli.config import driving, plants, sampled, samples, settings
 from koopcli.config.changes import SECTIONS, parse_set, toml_value
 from koopcli.config.data import data_folder
 from koopcli.config.experiment import load_experiment
@@ -14,7 +14,6 @@ from koopcli.config.pictures import PlotOptions
 from koopcli.config.samples import SAMPLES, BoxSample, GridSample
 from koopcli.config.settings import About, Baseline, Evaluate, FitEdmd, FitEigen, Reproduce, Simulate
 from koopcli.errors import InvalidValueError, UnknownNameError, UsageError
-from koopcli.figures.registry import FIGURES
 from koopcli.koopman.bases import BASES
 from koopcli.koopman.bases.thin_plate import PLACEMENTS
 from koopcli.koopman.eigen.frames import FRAMES
@@ -42,7 +41,6 @@ PAPER = tomllib.loads((data_folder() / "experiments" / "paper.toml").read_text()
         (settings.BasisName, BASES),
         (settings.BasisName, settings.OF_BASIS),
         (settings.Placement, PLACEMENTS),
-        (pictures.FigureName, FIGURES),
         (sampled.Kind, samples.SAMPLES),
         (sampled.Kind, samples.SAMPLED_FOR),
         (plants.PlantName, samples.CUSTOMS),

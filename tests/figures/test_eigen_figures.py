@@ -20,8 +20,8 @@ from koopcli.figures import (
     mean_trajectory,
     rmse_histogram,
 )
-from koopcli.figures.common.drawing import Source
-from koopcli.figures.common.ends import apart
+from koopcli.figures.kit.ends import apart
+from koopcli.figures.kit.figure import Source
 from koopcli.koopman.bases import Choice
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.scores.evaluation import evaluate

@@ -9,7 +9,7 @@ import pytest
 
 from koopcli.config.pictures import Cone
 from koopcli.figures import single_track, trajectory, tyre
-from koopcli.figures.common.drawing import Source
+from koopcli.figures.kit.figure import Source
 from koopcli.records import Trajectories
 from koopcli.simulation.manoeuvres import MANOEUVRES, OFFSET
 from koopcli.vehicles.handling import wheel_loads

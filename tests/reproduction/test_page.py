@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from koopcli.figures.common.drawing import Drawing
-from koopcli.figures.registry import FIGURES, drawing
+from koopcli.figures.kit.figure import Drawing, drawing
+from koopcli.figures.kit.registry import FIGURES
 from koopcli.koopman.scores import metrics
 from koopcli.reproduction.illustrations import Illustration
 from koopcli.reproduction.images import address, shrunk

@@ -19,7 +19,7 @@ from koopcli.config.pictures import Cone, Plot, Series, Subject, Tyres
 from koopcli.config.samples import BallSample, BoxSample, EllipsoidSample, GreedySample, GridSample, PointSample
 from koopcli.config.settings import Baseline, Evaluate, FitEdmd, FitEigen, Simulate, Sweep, SweepAxis
 from koopcli.config.shipped import fingerprint, used_by
-from koopcli.figures.registry import FIGURES
+from koopcli.figures.kit.registry import FIGURES
 from koopcli.koopman.bases.orthonormal import OrthonormalPolynomials
 from koopcli.koopman.bases.polynomial import Polynomial
 from koopcli.koopman.eigen.nodes import Search, nodes_of

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from koopcli.figures.common.style import LINE, SMALLEST, Axes
+from koopcli.figures.kit.style import LINE, SMALLEST, Axes
 from koopcli.records import FloatArray
 
 WIDEST = 17  # letters of a name in a line

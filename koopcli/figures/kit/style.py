@@ -9,22 +9,33 @@ from importlib import import_module
 from textwrap import fill, wrap
 from typing import TYPE_CHECKING, Any
 
-from koopcli.figures.common.colours import COLOURS, DASHES, GUIDE
-from koopcli.figures.common.signature import LONGEST
+from koopcli.figures.kit.signature import LONGEST
 from koopcli.text import printable
 
 if TYPE_CHECKING:
-    from matplotlib import axes, axis, figure, ticker
+    from matplotlib import axes, figure
+    from matplotlib.axis import Axis
     from mpl_toolkits.mplot3d import Axes3D
 
-    Axes, Axis, Figure, MaxNLocator = axes.Axes, axis.Axis, figure.Figure, ticker.MaxNLocator
-else:  # what most figures use of matplotlib, imported when the first one is drawn; they import the rest where they draw
+    Axes = axes.Axes
+    Figure = figure.Figure
+else:  # a figure is declared without matplotlib, which is imported when the first one is drawn
 
-    def _waiting(module: str, name: str) -> Any:
-        return lambda *given, **named: getattr(import_module(module), name)(*given, **named)
+    def Figure(**look: Any) -> Any:  # noqa: D103
+        return import_module("matplotlib.figure").Figure(**look)
 
-    Axes = Axis = Any
-    Figure, MaxNLocator = _waiting("matplotlib.figure", "Figure"), _waiting("matplotlib.ticker", "MaxNLocator")
+    Axes = Any
+
+# Okabe and Ito's palette: distinct to every common form of colour vision
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+MARKERS = ("o", "s", "^", "D", "v", "P")
+DASHES = ("-", "--", ":")
+PAPER = "#000000"
+TRAINING = "#bbbbbb"
+GUIDE = "#888888"  # what is not data: axes through zero, the unit circle, restarts
+OTHERS = ("#555555", "#999999")  # lines that another one is set beside
+BAND = "#b9d7ea"  # what most of the data lie in
+SHADES = "viridis_r"  # even in lightness, dark where errors are large
 
 COLUMN = 3.5  # inches, one column of a two-column page
 DOTS = 300  # per inch, of a png
@@ -88,6 +99,13 @@ def legend_below(figure: Figure, title: str | None = None, columns: int = 2, **l
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, title=title, **look)
 
 
+def ticks(axis: Axis, *most: int, **look: Any) -> None:
+    """At most so many intervals between round numbers along an axis; ``look``: as ``MaxNLocator`` takes it."""
+    from matplotlib.ticker import MaxNLocator
+
+    axis.set_major_locator(MaxNLocator(*most, **look))
+
+
 def plain_numbers(axis: Axis) -> None:
     """Numbers on a logarithmic axis as people write them, 0.1 and 20 rather than powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -108,7 +126,7 @@ def in_space(axes: Axes3D, names: Sequence[str], zoom: float) -> None:
         axis.labelpad = -6 if axis is axes.zaxis else -7
         axis.set_tick_params(pad=-2)
         axis.pane.set_facecolor("white")
-        axis.set_major_locator(MaxNLocator(4))
+        ticks(axis, 4)
 
 
 def symbol(name: str) -> str:
