@@ -53,7 +53,7 @@ def test_artefacts_complete_in_the_store_that_is_named(complete, koop, folder):
         assert complete("plot", figure, "") == names
     assert set(complete("plot", "no-such-figure", "")) >= {name, fit}
     (folder / "artefacts" / "records" / "\x1b[2J").mkdir()
-    assert complete("show", "fit") == []
+    assert complete("show", "eval") == []
 
 
 def test_a_store_that_cannot_be_read_has_no_names(complete, folder):

@@ -232,7 +232,13 @@ def test_a_changed_drawing_has_another_key(monkeypatch):
 
     code = figures.drawing_code()
     names = {f"{path.parent.name}/{path.name}" for path in code}
-    assert names >= {"figures/orders.py", "kit/style.py", "config/paper.py", "simulation/sampling.py", "vehicles/tyre.py"}
+    assert names >= {
+        "figures/orders.py",
+        "kit/style.py",
+        "config/paper.py",
+        "simulation/sampling.py",
+        "vehicles/tyre.py",
+    }
     assert all(path.is_file() for path in code)
     before, read = figures.source_digest.__wrapped__(), Path.read_bytes
     assert figures.source_digest.__wrapped__() == before
