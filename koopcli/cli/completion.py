@@ -25,8 +25,8 @@ def complete_name(ctx: typer.Context, incomplete: str) -> list[str]:
     except (KoopError, OSError):
         return []
     figure = ctx.params.get("figure")
-    stages = module_of(figure).FIGURE.stages if figure in NAMES else STAGES
-    names = [f"{stage}/{key}" for stage, key in stored if stage in stages]
+    taken = module_of(figure).FIGURE.stages if figure in NAMES else None
+    names = [f"{stage}/{key}" for stage, key in stored if taken is None or stage in taken]
     return _beginning(map(short_name, filter(is_name, names)), incomplete)
 
 

@@ -1,7 +1,7 @@
 """Figures: plain records in, a matplotlib figure out. Every file of this folder is a figure, called as the file is.
 
 ``FIGURE`` says what it shows, takes and makes; ``select(sources, settings)`` gathers what it shows in a small record,
-``numbers(shown)`` gives that as columns, ``draw(shown)`` as a matplotlib figure.
+``numbers(shown)`` gives that as columns, ``draw(shown)`` as a matplotlib figure. What figures share is in ``kit``.
 """
 
 import hashlib

@@ -20,8 +20,8 @@ from koopcli.simulation.manoeuvres import MANOEUVRES
 def _cones(recipes: Recipes, experiment: Experiment, artefacts: Sequence[Task]) -> tuple[Cone, ...]:
     """Those of the manoeuvre that the trajectories drive, where it has any; to the other side for a negative scale."""
     samples = [sample.settings for task in artefacts if (sample := task.find("sample")) is not None]
-    driven = [settings for settings in samples if isinstance(settings, ManoeuvreSample)]
-    return tuple(Cone(X, Y if one.scale >= 0 else -Y) for one in driven for X, Y in MANOEUVRES[one.name].cones)
+    driven = [sample for sample in samples if isinstance(sample, ManoeuvreSample)]
+    return tuple(Cone(X, Y if drive.scale >= 0 else -Y) for drive in driven for X, Y in MANOEUVRES[drive.name].cones)
 
 
 FIGURE = FigureKind(

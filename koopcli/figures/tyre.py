@@ -22,13 +22,13 @@ OF_TYRES = ("m", "l_f", "l_r", "mu_scale", *TYRES)  # parameters that tyre force
 
 def _tyres(recipes: Recipes, experiment: Experiment, artefacts: Sequence[Task]) -> tuple[Tyres, ...]:
     """The tyres of the experiment's vehicle and of those beside it. Raises ``InvalidValueError`` for one without."""
-    found = []
+    tyres = []
     for name, driving in recipes.vehicles(experiment):
         p = driving.vehicle
         if p.lateral is None or p.longitudinal is None:
             raise InvalidValueError(f"the vehicle {name} has no tyres: give its file [lateral] and [longitudinal]")
-        found.append(Tyres(name, wheel_loads(p), p.mu_scale, tyres_of(p, "lateral"), tyres_of(p, "longitudinal")))
-    return tuple(found)
+        tyres.append(Tyres(name, wheel_loads(p), p.mu_scale, tyres_of(p, "lateral"), tyres_of(p, "longitudinal")))
+    return tuple(tyres)
 
 
 FIGURE = FigureKind(

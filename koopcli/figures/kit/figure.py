@@ -37,10 +37,7 @@ TAKES: dict[Takes, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class FigureKind:
-    """A figure: what it shows, takes and is told, and what it makes when no artefact is named.
-
-    Whatever makes tasks is handed the recipes and the experiment. It has to be a lambda where it is written below.
-    """
+    """A figure: what it shows, takes and is told, and what it makes when no artefact is named."""
 
     about: str
     """What it shows, in a line."""
