@@ -182,7 +182,7 @@ def _notes(shown: Path, panels: Sequence[_Panel]) -> list[str]:
     found = [f"ends at {shown.time[-1]:.2f} s: it {shown.end}"] if shown.end else []
     held: dict[str, list[str]] = {}
     for panel in panels:
-        for name in panel.lines.keys() - panel.moving.keys():
+        for name in (name for name in panel.lines if name not in panel.moving):
             if value := panel.lines[name][0]:
                 held.setdefault(f"{value:.3g} {panel.unit}", []).append(symbol(name))
     constant = "; ".join(f"{', '.join(sorted(names))} {value}" for value, names in held.items())
