@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from koopcli.cli.invocation import Invocation
 from koopcli.config.changes import Changes, parse_set
-from koopcli.config.experiment import load_experiment
+from koopcli.config.experiment import Experiment, load_experiment
 from koopcli.config.grids import text_of
 from koopcli.errors import KoopError
 
@@ -102,10 +102,14 @@ def _short(typed: Typed, call: Invocation, evaluation: Task, better: Better) -> 
     try:
         tested = {section: values for section, values in call.changes.items() if section in TEST}  # by options too
         experiment = load_experiment(better.experiment, {**_changes(sets), **tested})
-        fit = recipes.predictor(experiment)
         test = evaluation.input("trajectories") if "on" in typed.words else None
-        task = recipes.evaluation(experiment, fit, test)
-        idle = any(why_idle(name, experiment, [task]) for name in sets)
+
+        def plan(experiment: Experiment) -> list[Task]:
+            return [recipes.evaluation(experiment, recipes.predictor(experiment), test)]
+
+        (task,) = plan(experiment)
+        fit = task.input("predictor")
+        idle = any(why_idle(name, experiment, plan, [task]) for name in sets)
     except KoopError:
         return None
     if idle or task.input("trajectories") != evaluation.input("trajectories"):

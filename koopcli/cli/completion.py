@@ -6,25 +6,27 @@ A completion never complains: where names cannot be listed there are none.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import get_args
 
 import typer
 
 from koopcli.config.data import data_folder
-from koopcli.config.pictures import FigureName
 from koopcli.errors import KoopError
+from koopcli.figures import NAMES, module_of
 
 STAGES = ("sample", "simulate", "fit-edmd", "fit-eigen", "baseline", "evaluate", "sweep", "plot")  # heavy to ask for
 
 
 def complete_name(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Artefacts in the store, that of ``--store`` where it stands before."""
+    """Artefacts in the store, that of ``--store`` where it stands before; of a figure those that it takes."""
     from koopcli.store.names import index, is_name, short_name, store_root
 
     try:
-        names = [f"{stage}/{key}" for stage, key in index(store_root(ctx.params.get("store")))]
+        stored = index(store_root(ctx.params.get("store")))
     except (KoopError, OSError):
         return []
+    figure = ctx.params.get("figure")
+    taken = module_of(figure).FIGURE.stages if figure in NAMES else None
+    names = [f"{stage}/{key}" for stage, key in stored if taken is None or stage in taken]
     return _beginning(map(short_name, filter(is_name, names)), incomplete)
 
 
@@ -35,7 +37,7 @@ def complete_stage(incomplete: str) -> list[str]:
 
 def complete_figure(incomplete: str) -> list[str]:
     """Figures."""
-    return _beginning(get_args(FigureName), incomplete)
+    return _beginning(NAMES, incomplete)
 
 
 def complete_experiment(incomplete: str) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, get_args
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,13 +11,14 @@ from koopcli.cli.completion import complete_figure, complete_name
 from koopcli.cli.invocation import begin, print_json
 from koopcli.cli.options import DryRunOption, ExperimentOption, JsonOption, SetOption, StoreOption
 from koopcli.cli.outputs import STDOUT, CsvOption, OutputOption, check_outputs, image_format, write_outputs
-from koopcli.config.changes import SECTIONS, flat
-from koopcli.config.pictures import FigureName
+from koopcli.config.changes import SECTIONS
 from koopcli.console import show_table
 from koopcli.errors import UnknownNameError, UsageError
+from koopcli.figures import NAMES
 
 if TYPE_CHECKING:
-    from koopcli.figures.registry import FigureKind
+    from koopcli.config.experiment import Experiment
+    from koopcli.figures.kit.figure import FigureKind
     from koopcli.stages.base import Task
     from koopcli.stages.pipeline import Artefact
 
@@ -53,37 +54,32 @@ def plot(
         _list(as_json=as_json)
         return
     if figure is None:
-        raise UsageError(f"which figure? Name one of: {', '.join(get_args(FigureName))}")
-    if figure not in get_args(FigureName):
-        raise UnknownNameError(f"unknown figure '{figure}'{candidates(figure, get_args(FigureName))}")
+        raise UsageError(f"which figure? Name one of: {', '.join(NAMES)}")
+    if figure not in NAMES:
+        raise UnknownNameError(f"unknown figure '{figure}'{candidates(figure, NAMES)}")
     image = image_format(output)
     check_outputs(output, csv_, as_json=as_json)
     call = begin(store, experiment, set_, SECTIONS)
-    from koopcli.figures.registry import FIGURES
-    from koopcli.stages import drawn, recipes
+    from koopcli.figures.kit.registry import FIGURES
+    from koopcli.stages import figure_tasks
 
-    kind, made = FIGURES[figure], drawn.MADE[FIGURES[figure].made]
+    kind = FIGURES[figure]
     if artefacts and kind.takes == "nothing":
         raise UsageError(f"the figure '{figure}' draws no artefact: leave out {' '.join(artefacts)}")
-    if artefacts:
-        told = drawn.TOLD_BESIDE if kind.takes == "predictor" else ("plot",) if kind.told else ()
-        sources = [call.named(one, drawn.TAKES[kind.takes], f"what '{figure}' draws", told) for one in artefacts]
-    else:
-        for name, _ in flat(call.changes):
-            if made.chooses(name, call.experiment):
-                raise UsageError(f"--set {name} changes nothing in the figure '{figure}': {made.instead}")
-        sources = made.tasks(call.experiment)
-    labels = _labels(label, sources, kind)
+    told = figure_tasks.TOLD_BESIDE if kind.takes == "predictor" else ("plot",) if kind.told else ()
+    named = [call.named(name, kind.stages, f"what '{figure}' draws", told) for name in artefacts or []]
+    labels = _labels(label, named or figure_tasks.artefacts(figure, call.experiment), kind)
 
     def export(artefact: Artefact) -> None:
         write_outputs(call.console, artefact.content.image, output, artefact.content, csv_)
         if output is None and csv_ is None and not as_json:
             call.console.note("add -o FILE.png, .svg or .pdf to write the image, --csv FILE for its numbers")
 
-    task = drawn.figure(figure, sources, image, call.experiment, call.simulated, labels)
-    reads = [*made.reads, *(f"plot.{name}" for name in kind.told)]
-    reads += recipes.CHOSEN if made.fit is not None and not artefacts else ()
-    call.run(task, as_json=as_json, dry_run=dry_run, extra=export, reads=reads, table_out=csv_ == STDOUT)
+    def drawn(experiment: Experiment) -> Task:
+        sources = named or figure_tasks.artefacts(figure, experiment)
+        return figure_tasks.figure(figure, sources, image, experiment, call.simulated, labels)
+
+    call.run(drawn, as_json=as_json, dry_run=dry_run, extra=export, table_out=csv_ == STDOUT)
 
 
 def _labels(given: list[str] | None, sources: list[Task], kind: FigureKind) -> dict[Task, str] | None:
@@ -98,7 +94,7 @@ def _labels(given: list[str] | None, sources: list[Task], kind: FigureKind) -> d
 
 
 def _list(*, as_json: bool) -> None:
-    from koopcli.figures.registry import FIGURES
+    from koopcli.figures.kit.registry import FIGURES
 
     if as_json:
         print_json({name: {"shows": kind.about, "takes": kind.takes} for name, kind in FIGURES.items()})

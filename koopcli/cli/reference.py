@@ -31,7 +31,7 @@ def _settings() -> Iterator[str]:
     yield "## Settings\n"
     yield "For `--set SECTION.KEY=VALUE` and for experiment files. Values are TOML; `--set` also takes numbers such as"
     yield ".5, as options do, and one name for a list of names. `vehicle.name` chooses a vehicle.\n"
-    yield "A setting of a kind, such as `fit-edmd.basis.thin-plate.centres`, holds for it, whether it is in effect or not."
+    yield "A setting of a kind, such as `fit-edmd.basis.thin-plate.centres`, holds for that kind, in effect or not."
     yield "Without the kind, as `fit-edmd.centres` or `sample.seed`, it is a setting of the kind in effect.\n"
     yield "| setting | default | allowed | meaning |\n|---|---|---|---|"
     for declared in every_setting():

@@ -272,10 +272,10 @@ def _percent(value: float) -> str:
 
 def _drawn(call: Invocation, artefact: Artefact, image: ImageFormat) -> bytes:
     """The figure of a sweep; nothing, and why, where there is none to draw."""
-    from koopcli.stages import drawn
+    from koopcli.stages import figure_tasks
 
     try:
-        task = drawn.figure("sweep", [call.pipeline.named(artefact.record.name)], image, call.experiment)
+        task = figure_tasks.figure("sweep", [call.pipeline.named(artefact.record.name)], image, call.experiment)
         found: bytes = call.pipeline.make(task).content.image
     except InvalidValueError as error:  # where all diverged
         call.console.warn(f"the figure is not drawn: {error}")

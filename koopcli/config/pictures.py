@@ -9,28 +9,6 @@ from koopcli.checks import setting
 from koopcli.config.shipped import Fingerprint
 from koopcli.vehicles.parameters import MagicFormula
 
-FigureName = Literal[
-    "single-track",
-    "tyre",
-    "trajectory",
-    "orders",
-    "best-order",
-    "sweep",
-    "random-input",
-    "energy-surface",
-    "error-map",
-    "error-side",
-    "mean-trajectory",
-    "rmse-histogram",
-    "horizon",
-    "compare",
-    "density",
-    "before-after",
-    "modes",
-    "frontier",
-    "trust",
-    "spectrum",
-]
 ImageFormat = Literal["png", "svg", "pdf"]
 
 
@@ -83,7 +61,7 @@ class PlotOptions:
 class Plot:
     """A figure, what it is of and told beside its inputs, and the digest of the code that draws it."""
 
-    figure: FigureName
+    figure: str
     format: ImageFormat
     drawn_by: str
     of: Subject = Subject()

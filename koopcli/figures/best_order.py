@@ -3,20 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
+from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import COLOURS, PAPER
-from koopcli.figures.drawing import Source, column
+from koopcli.errors import InvalidValueError
+from koopcli.figures.kit.figure import FigureKind, Recipes, Source, Task, column
+from koopcli.figures.kit.style import COLOURS, COLUMN, PAPER, Figure, legend_below, style, ticks
 from koopcli.figures.orders import select as by_draw
-from koopcli.figures.style import COLUMN, legend_below, style
 from koopcli.records import Array
+from koopcli.simulation.samples.grid import GridSample
+
+
+def _sweep(recipes: Recipes, experiment: Experiment) -> list[Task]:
+    """One evaluation for each order of the sweep, on each of many random training grids."""
+    grid = experiment.sample("grid")
+    if not isinstance(grid, GridSample):
+        raise InvalidValueError("training draws are those of a grid: sample.kind must be 'grid'")
+    evaluations = []
+    for seed in range(experiment.reproduce.full_draws):
+        training = recipes.simulation(experiment, recipes.sample(replace(grid, seed=seed)))
+        for order in experiment.reproduce.orders:
+            fit = recipes.fit_edmd(recipes.with_order(experiment, order), training)
+            evaluations.append(recipes.evaluation(experiment, fit))
+    return evaluations
+
+
+FIGURE = FigureKind(
+    about="how often each order is the best, over training draws",
+    takes="evaluation",
+    draws="points",
+    makes=_sweep,
+    only="fit-edmd",
+    instead="it sweeps reproduce.orders over reproduce.full_draws random grids",
+)
 
 
 @dataclass(frozen=True)
@@ -51,7 +75,7 @@ def draw(shown: BestOrders) -> Figure:
         there = [order for order in BEST_ORDERS if order in shown.orders]
         axes.plot(there, [0.0] * len(there), "^", color=PAPER, clip_on=False, zorder=5, label="the paper's best orders")
         axes.set_xticks(shown.orders)
-        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+        ticks(axes.yaxis, integer=True)
         axes.set_xlabel("order of the polynomial basis")
         axes.set_ylabel("training draws (1)")
         legend_below(figure)

@@ -7,13 +7,20 @@ from dataclasses import dataclass
 from textwrap import fill
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import COLOURS
-from koopcli.figures.drawing import Source, column, with_error
-from koopcli.figures.style import COLUMN, LINE, plain, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Source, column, with_error
+from koopcli.figures.kit.style import COLOURS, COLUMN, LINE, Figure, plain, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray
+
+FIGURE = FigureKind(
+    about="the errors of several predictors on one test set, side by side",
+    takes="evaluation",
+    draws="beside",
+    makes=lambda recipes, experiment: recipes.side_by_side(experiment),
+    usual="fit-eigen",
+    instead="it sets one predictor beside fixed baselines and EDMD fits; name evaluations to choose others",
+)
 
 WIDEST = 34  # letters of a name in a line
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

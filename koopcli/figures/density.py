@@ -7,13 +7,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import BAND, COLOURS
-from koopcli.figures.drawing import Source, column, with_error
-from koopcli.figures.style import COLUMN, legend_below, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Source, column, with_error
+from koopcli.figures.kit.style import BAND, COLOURS, COLUMN, Figure, legend_below, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray
+
+FIGURE = FigureKind(
+    about="RMSE against the distance of the initial state to the data",
+    takes="evaluation",
+    usual="fit-eigen",
+)
 
 BINS, FEWEST = 20, 20  # of distance, even; trajectories that a group of them has at least
 QUANTILES = (0.1, 0.25, 0.5, 0.75, 0.9)

@@ -7,15 +7,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.colours import COLOURS, GUIDE
-from koopcli.figures.drawing import Source, column, state_columns
-from koopcli.figures.style import COLUMN, axis_label, in_space, style
+from koopcli.figures.kit.figure import FigureKind, Source, column, state_columns
+from koopcli.figures.kit.style import COLOURS, COLUMN, GUIDE, Figure, axis_label, in_space, style
 from koopcli.records import Array, Channels, FloatArray, Sample
 from koopcli.simulation.sampling import sphere_mesh
+
+FIGURE = FigureKind(
+    about="Γ, the surface of one kinetic energy, with its initial states",
+    takes="sample",
+    kinds=("ellipsoid",),
+    makes=lambda recipes, experiment: [recipes.sample(experiment.sample("ellipsoid"))],
+)
 
 FINEST = 20  # faces from pole to pole at least, a multiple of the states' own
 OFF_SURFACE = 1e-6  # relative, of states that are taken to lie on one surface

@@ -6,18 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
-from mpl_toolkits.mplot3d import Axes3D
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.balls import Balls, balls, columns
-from koopcli.figures.colours import SHADES
-from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, axis_label, in_space, style, symbol
+from koopcli.figures.kit.balls import Balls, balls, columns
+from koopcli.figures.kit.figure import FigureKind, Source, column
+from koopcli.figures.kit.style import COLUMN, SHADES, Figure, axis_label, in_space, style, symbol, ticks
 from koopcli.records import Array, FloatArray
+
+FIGURE = FigureKind(
+    about="RMSE by initial state: its mean over a slice, and every state in space",
+    takes="evaluation",
+    usual="fit-eigen",
+)
 
 PALEST = 0.2  # opacity of a ball without error
 ACROSS, UP, THROUGH = 0, 2, 1  # the states of the slice, and the one that it is thin in
@@ -89,6 +89,10 @@ FROM_TO = ((0, "from"), (1, "to"))
 
 def draw(shown: ErrorMap) -> Figure:
     """The slice large; beside it all states in space, the paler the smaller the error, in the same colours."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from mpl_toolkits.mplot3d import Axes3D
+
     seen = shown.balls
     names = [axis_label(n, u) for n, u in zip(seen.channels.names, seen.channels.units, strict=True)]
     scale = Normalize(0, seen.top)
@@ -111,7 +115,7 @@ def draw(shown: ErrorMap) -> Figure:
         in_space(space, [symbol(name) for name in seen.channels.names], zoom=1.08)
         space.set_title("every state", fontsize=8)
         for axis in (space.xaxis, space.yaxis, space.zaxis):
-            axis.set_major_locator(MaxNLocator(2))
+            ticks(axis, 2)
             axis.set_ticklabels([])
             axis.labelpad = -17
             axis.set_rotate_label(axis is space.zaxis)

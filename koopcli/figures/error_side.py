@@ -6,16 +6,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.balls import Balls, balls, columns
-from koopcli.figures.colours import SHADES, TRAINING
-from koopcli.figures.drawing import Source, column, state_columns
-from koopcli.figures.style import COLUMN, axis_label, legend_below, style
+from koopcli.figures.kit.balls import Balls, balls, columns
+from koopcli.figures.kit.figure import FigureKind, Source, column, state_columns
+from koopcli.figures.kit.style import COLUMN, SHADES, TRAINING, Figure, axis_label, legend_below, style
 from koopcli.koopman.predictor.coverage import spread
 from koopcli.records import Array, FloatArray, Trajectories
+
+FIGURE = FigureKind(
+    about="RMSE by initial state from the side, over the training trajectories",
+    takes="evaluation",
+    behind=("training",),
+    usual="fit-eigen",
+)
 
 PATHS, STARTS = 500, 20_000  # training trajectories, or states of single steps, drawn at most
 SIDE = [1, 2]  # the states of the plane
@@ -49,6 +53,8 @@ def numbers(shown: ErrorSide) -> Mapping[str, Array]:
 
 def draw(shown: ErrorSide) -> Figure:
     """One plane."""
+    from matplotlib.collections import LineCollection
+
     seen, channels = shown.balls, shown.balls.channels
     i, j = SIDE
     with style():

@@ -3,17 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from matplotlib.figure import Figure
 
+from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.colours import MARKERS
-from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Recipes, Source, Task, column
+from koopcli.figures.kit.style import COLUMN, MARKERS, Figure, legend_below, looks, plain, plain_numbers, style
 from koopcli.records import Array, FloatArray
+from koopcli.simulation.samples.greedy import GreedySample
+
+
+def _sweep(recipes: Recipes, experiment: Experiment) -> list[Task]:
+    """The best predictor on every budget, with and without mirror images, for every vehicle shown."""
+    evaluations = []
+    for _, driving in recipes.vehicles(experiment):
+        for budget in experiment.reproduce.budgets:
+            best = recipes.best_eigen(driving, budget)
+            states = best.sample("greedy")
+            assert isinstance(states, GreedySample)
+            for mirrored in (True, False):
+                chosen = replace(states, mirror=states.mirror if mirrored else ())
+                fit = replace(best.fit_eigen, mirror=best.fit_eigen.mirror if mirrored else ())
+                training = recipes.simulation(best, recipes.sample(chosen), plant="slips")
+                trained = recipes.fit_eigen(replace(best, fit_eigen=fit), training)
+                test = recipes.test_set(experiment, trained.ancestor("simulate").settings)
+                evaluations.append(recipes.evaluation(experiment, trained, test))
+    return evaluations
+
+
+FIGURE = FigureKind(
+    about="RMSE against simulated seconds, of every vehicle",
+    takes="evaluation",
+    draws="points",
+    against="seconds",
+    makes=_sweep,
+    only="fit-eigen",
+    instead="it draws the experiment best-eigen on reproduce.budgets; name evaluations to choose others",
+)
 
 PANEL = 2.3  # inches
 

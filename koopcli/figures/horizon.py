@@ -7,14 +7,22 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import BAND, COLOURS, DASHES, OTHERS
-from koopcli.figures.drawing import LOST, Source, column, with_error
-from koopcli.figures.ends import End, name_ends, room_for
-from koopcli.figures.style import COLUMN, plain, plain_numbers, style
+from koopcli.figures.kit.ends import End, name_ends, room_for
+from koopcli.figures.kit.figure import LOST, FigureKind, Source, column, with_error
+from koopcli.figures.kit.style import BAND, COLOURS, COLUMN, DASHES, OTHERS, Figure, plain, plain_numbers, style
 from koopcli.records import Array, BoolArray, FloatArray, Trajectories
+
+FIGURE = FigureKind(
+    about="error against time, of one predictor or of several on one test set",
+    takes="evaluation",
+    behind=("predictor", "trajectories"),
+    draws="beside",
+    makes=lambda recipes, experiment: recipes.side_by_side(experiment),
+    usual="fit-eigen",
+    instead="it sets one predictor beside fixed baselines and EDMD fits; name evaluations to choose others",
+)
 
 QUANTILES = {"lower": 0.1, "median": 0.5, "upper": 0.9}
 BLOCK = 4096  # trajectories predicted together

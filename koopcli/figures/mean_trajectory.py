@@ -6,13 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import COLOURS
-from koopcli.figures.drawing import Source, column, state_columns, with_error
-from koopcli.figures.style import COLUMN, axis_label, style
+from koopcli.figures.kit.figure import FigureKind, Source, column, state_columns, with_error
+from koopcli.figures.kit.style import COLOURS, COLUMN, Figure, axis_label, style
 from koopcli.records import Array, Channels, FloatArray, Trajectories
+
+FIGURE = FigureKind(
+    about="the test trajectory whose RMSE is nearest the mean, true and predicted",
+    takes="evaluation",
+    behind=("predictor", "trajectories"),
+    usual="fit-eigen",
+)
 
 
 @dataclass(frozen=True)

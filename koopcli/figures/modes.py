@@ -3,19 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
+from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.colours import MARKERS
-from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Recipes, Source, Task, column
+from koopcli.figures.kit.style import COLUMN, MARKERS, Figure, legend_below, looks, plain, plain_numbers, style, ticks
+from koopcli.koopman.eigen.windows import AlongTrajectory
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.records import Array, FloatArray
+
+
+def _sweep(recipes: Recipes, experiment: Experiment) -> list[Task]:
+    """One evaluation for each number of rates, of every kind; the best boundary values unless windows are fitted."""
+    fit = experiment.fit_eigen
+    if isinstance(fit.window, AlongTrajectory):
+        fit = fit.but(boundary="optimal")
+    fits = recipes.mode_fits(fit, experiment.reproduce.pairs)
+    return [recipes.evaluation(experiment, recipes.fit_eigen(replace(experiment, fit_eigen=fit))) for fit in fits]
+
+
+FIGURE = FigureKind(
+    about="what the fit misses, and RMSE, against the number of rates",
+    takes="evaluation",
+    behind=("predictor",),
+    draws="points",
+    against="modes",
+    makes=_sweep,
+    only="fit-eigen",
+    instead="it sweeps the degree of the lattice and reproduce.pairs",
+)
 
 
 @dataclass(frozen=True)
@@ -65,7 +85,7 @@ def draw(shown: Sequence[ModeErrors]) -> Figure:
             axes.set_yscale("log")
             plain_numbers(axes.yaxis)
             axes.set_ylabel(name)
-        prediction.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ticks(prediction.xaxis, integer=True)
         prediction.set_xlabel("modes of a state (1)")
         legend_below(figure, columns=3)
     return figure

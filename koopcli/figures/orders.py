@@ -8,16 +8,33 @@ from itertools import cycle
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
+from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.colours import COLOURS, MARKERS, PAPER
-from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, legend_below, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Recipes, Source, Task, column
+from koopcli.figures.kit.style import COLOURS, COLUMN, MARKERS, PAPER, Figure, legend_below, plain_numbers, style, ticks
 from koopcli.records import Array, FloatArray
+
+
+def _sweep(recipes: Recipes, experiment: Experiment) -> list[Task]:
+    """One evaluation for each order of the experiment's sweep. Raises ``InvalidValueError`` for a basis without any."""
+    basis = experiment.fit_edmd.basis
+    if not hasattr(basis, "order"):
+        raise InvalidValueError(f"the basis '{basis.kind}' has no order to sweep: choose polynomials")
+    fits = (recipes.fit_edmd(recipes.with_order(experiment, order)) for order in experiment.reproduce.orders)
+    return [recipes.evaluation(experiment, fit) for fit in fits]
+
+
+FIGURE = FigureKind(
+    about="RMSE against the order of the basis, beside the paper's best",
+    takes="evaluation",
+    draws="points",
+    makes=_sweep,
+    only="fit-edmd",
+    instead="it sweeps reproduce.orders with sample.draw and test.excitation",
+)
 
 
 @dataclass(frozen=True)
@@ -78,7 +95,7 @@ def draw(curves: Sequence[OrderErrors]) -> Figure:
         axes.plot(BEST_ORDERS, points, "x", color=PAPER, markersize=6, markeredgewidth=1.4, label=label, zorder=5)
         axes.set_yscale("log")
         plain_numbers(axes.yaxis)
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ticks(axes.xaxis, integer=True)
         axes.set_xlabel("order of the polynomial basis")
         axes.set_ylabel("RMSE (%)")
         legend_below(figure, title=curves[0].label if len(curves) == 1 else None)

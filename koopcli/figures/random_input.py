@@ -6,16 +6,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.colours import COLOURS, GUIDE
-from koopcli.figures.drawing import Source, column, state_columns
-from koopcli.figures.style import COLUMN, axis_label, style
+from koopcli.figures.kit.figure import FigureKind, Source, column, state_columns
+from koopcli.figures.kit.style import COLOURS, COLUMN, GUIDE, Figure, axis_label, style
 from koopcli.koopman.scores.metrics import rmse
 from koopcli.koopman.scores.restarts import restarted
 from koopcli.records import Array, Channels, FloatArray, Trajectories
+
+FIGURE = FigureKind(
+    about="one trajectory under random inputs, true and predicted, with restarts",
+    takes="predictor",
+    behind=("trajectories",),
+    told={"restart": lambda recipes, experiment, artefacts: experiment.plot.restart},
+    usual="fit-edmd",
+)
 
 MARKED = 15  # restarts that are marked by lines; more would hide what is drawn
 

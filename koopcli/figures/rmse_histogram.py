@@ -6,13 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import COLOURS
-from koopcli.figures.drawing import LOST, Source, column, with_error
-from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
+from koopcli.figures.kit.figure import LOST, FigureKind, Source, column, with_error
+from koopcli.figures.kit.style import COLOURS, COLUMN, Figure, legend_below, looks, plain, plain_numbers, style
 from koopcli.records import Array, FloatArray
+
+FIGURE = FigureKind(
+    about="how the RMSE of the trajectories is distributed",
+    takes="evaluation",
+    draws="beside",
+    usual="fit-eigen",
+)
 
 BINS = 40
 NARROWEST = 1.5  # ratio of the largest and the smallest RMSE of the bins

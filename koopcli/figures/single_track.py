@@ -6,16 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Arc, FancyBboxPatch
-from matplotlib.transforms import Affine2D
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import COLOURS, GUIDE, PAPER
-from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, style
+from koopcli.figures.kit.figure import FigureKind, Source, column
+from koopcli.figures.kit.style import COLOURS, COLUMN, GUIDE, PAPER, Axes, Figure, style
 from koopcli.records import Array, FloatArray
+
+FIGURE = FigureKind(about="the vehicle: states, forces and angles with their signs", takes="nothing")
 
 FRONT, REAR = np.array([1.6, 0.0]), np.array([-1.6, 0.0])  # m, as all lengths here
 STEER = {"f": np.deg2rad(20.0), "r": np.deg2rad(-20.0)}
@@ -105,6 +102,9 @@ def _point(at: FloatArray) -> tuple[float, float]:
 
 
 def _wheel(axes: Axes, at: FloatArray, steer: float) -> None:
+    from matplotlib.patches import FancyBboxPatch
+    from matplotlib.transforms import Affine2D
+
     length, width = WHEEL
     shape = FancyBboxPatch(
         (-length / 2, -width / 2),
@@ -128,6 +128,8 @@ def _arrow(axes: Axes, arrow: Arrow) -> None:
 
 def _angle(axes: Axes, at: FloatArray, start: float, end: float, radius: float, name: str, along: float = 0.0) -> None:
     """An arc from one direction to another, the way in which the angle is positive, and a line ``along`` one."""
+    from matplotlib.patches import Arc
+
     low, high = sorted((start, end))
     reach = (radius + 0.12) * np.array([np.cos(along), np.sin(along)])
     axes.plot(*np.stack([at, at + reach]).T, "--", color=GUIDE, linewidth=0.7, zorder=1)
@@ -143,6 +145,8 @@ def _angle(axes: Axes, at: FloatArray, start: float, end: float, radius: float, 
 
 def _yaw_rate(axes: Axes) -> None:
     """An arc about the centre of gravity, turning to the left."""
+    from matplotlib.patches import Arc
+
     radius, end = 0.5, np.deg2rad(165.0)
     axes.add_patch(Arc((0, 0), 2 * radius, 2 * radius, theta1=105, theta2=160, color=MOTION, linewidth=1.3))
     tip = radius * np.array([np.cos(end), np.sin(end)])

@@ -6,18 +6,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter, SymmetricalLogLocator
 
 from koopcli.config.pictures import Plot
-from koopcli.figures.colours import COLOURS, GUIDE
-from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, legend_below, style
+from koopcli.figures.kit.figure import FigureKind, Source, column
+from koopcli.figures.kit.style import COLOURS, COLUMN, GUIDE, Axes, Figure, legend_below, style, ticks
 from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
 from koopcli.koopman.predictor.modes import ComplexArray
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.records import Array, FloatArray
+
+FIGURE = FigureKind(
+    about="damping of the modes of a predictor against their frequency",
+    takes="fit",
+    usual="fit-edmd",
+)
 
 ROUNDING = 1e-9  # of an eigenvalue: one that is 1 neither grows nor decays
 DECADES = 4  # of damping that are drawn on a logarithmic axis; what is nearer to zero lies on a linear one
@@ -99,19 +101,21 @@ def draw(shown: Spectrum) -> Figure:
             axes.axhline(0, color=GUIDE, linewidth=0.8)
         fastest = max(SLOWEST, float(frequency.max(initial=0.0)))
         plane.set_xlim(-0.03 * fastest, 1.03 * fastest)  # room for rings at zero
-        plane.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        ticks(plane.xaxis, 5, steps=[1, 2, 5, 10])
         density.set_xlim(left=0)
         _damping_axis(plane, shown)
         plane.set_xlabel("frequency (Hz)")
         plane.set_ylabel("damping (1/s)")
         density.set_xlabel("number (1)")
-        density.xaxis.set_major_locator(MaxNLocator(2, integer=True))
+        ticks(density.xaxis, 2, integer=True)
         legend_below(figure, f"each {shown.copies} times" if shown.copies > 1 else None)
     return figure
 
 
 def _damping_axis(axes: Axes, shown: Spectrum) -> None:
     """Damping, logarithmic to both sides of zero where it goes far."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter, SymmetricalLogLocator
+
     axes.set_yscale("symlog", linthresh=shown.linear)
     low, high = _stretched(shown.edges[[0, -1]], shown.linear)
     margin = 0.05 * (high - low)

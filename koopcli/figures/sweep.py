@@ -7,15 +7,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, legend_below, looks, plain, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Source, column
+from koopcli.figures.kit.style import COLUMN, Figure, legend_below, looks, plain, plain_numbers, style, ticks
 from koopcli.koopman.scores.swept import REPEATS, Swept
 from koopcli.records import Array, FloatArray
+
+FIGURE = FigureKind(
+    about="RMSE over a swept grid of settings",
+    takes="sweep",
+    only="fit-edmd",
+    instead="it sweeps reproduce.orders over reproduce.draw_seeds; koop sweep sweeps anything",
+)
 
 MOST = 12  # curves that can be told apart
 WIDE = 100  # ratio of the ends of an axis from which on it is logarithmic
@@ -109,7 +114,7 @@ def _along(axes: Any, shown: SweptErrors) -> None:
     elif at[0] >= 0 and at[-1] > WIDE * (least := at[at > 0][0]):
         axes.set_xscale("symlog", linthresh=least) if at[0] == 0 else axes.set_xscale("log")
     elif (at == np.round(at)).all():
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ticks(axes.xaxis, integer=True)
 
 
 def _axis(table: Swept) -> int:

@@ -6,16 +6,33 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
-from koopcli.config.pictures import Plot
+from koopcli.config.experiment import Experiment
+from koopcli.config.pictures import Cone, Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.colours import COLOURS
-from koopcli.figures.drawing import Source, column, state_columns
-from koopcli.figures.style import COLUMN, SMALLEST, axis_label, looks, style, symbol
+from koopcli.figures.kit.figure import FigureKind, Recipes, Source, Task, column, state_columns
+from koopcli.figures.kit.style import COLOURS, COLUMN, SMALLEST, Axes, Figure, axis_label, looks, style, symbol, ticks
 from koopcli.records import ENDS, Array, Channels, FloatArray, Trajectories
+from koopcli.simulation.manoeuvres import MANOEUVRES
+from koopcli.simulation.samples.manoeuvre import ManoeuvreSample
+
+
+def _cones(recipes: Recipes, experiment: Experiment, artefacts: Sequence[Task]) -> tuple[Cone, ...]:
+    """Those of the manoeuvre that the trajectories drive, where it has any; to the other side for a negative scale."""
+    samples = [sample.settings for task in artefacts if (sample := task.find("sample")) is not None]
+    driven = [sample for sample in samples if isinstance(sample, ManoeuvreSample)]
+    return tuple(Cone(X, Y if drive.scale >= 0 else -Y) for drive in driven for X, Y in MANOEUVRES[drive.name].cones)
+
+
+FIGURE = FigureKind(
+    about="one simulated trajectory: course, states and inputs",
+    takes="trajectories",
+    told={
+        "trajectory": lambda recipes, experiment, artefacts: experiment.plot.trajectory,
+        "cones": _cones,
+    },
+    makes=lambda recipes, experiment: [recipes.simulation(experiment, recipes.sample(experiment.sample("manoeuvre")))],
+)
 
 RIM = {"wheel_rate_f": "front", "wheel_rate_r": "rear"}
 HEADINGS = 12  # cars drawn along the course
@@ -165,7 +182,7 @@ def _notes(shown: Path, panels: Sequence[_Panel]) -> list[str]:
     found = [f"ends at {shown.time[-1]:.2f} s: it {shown.end}"] if shown.end else []
     held: dict[str, list[str]] = {}
     for panel in panels:
-        for name in panel.lines.keys() - panel.moving.keys():
+        for name in (name for name in panel.lines if name not in panel.moving):
             if value := panel.lines[name][0]:
                 held.setdefault(f"{value:.3g} {panel.unit}", []).append(symbol(name))
     constant = "; ".join(f"{', '.join(sorted(names))} {value}" for value, names in held.items())
@@ -184,7 +201,7 @@ def _draw_course(axes: Axes, shown: Path, stretched: float) -> None:
     axes.set_aspect(stretched, adjustable="datalim")
     axes.set_xlabel("X (m)")
     axes.set_ylabel("Y (m)" if stretched == 1 else f"Y, {stretched:g} : 1\n(m)")
-    axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+    ticks(axes.yaxis, 4, steps=[1, 2, 5, 10])
 
 
 def _draw_panel(axes: Axes, time: FloatArray, panel: _Panel) -> None:
@@ -193,7 +210,7 @@ def _draw_panel(axes: Axes, time: FloatArray, panel: _Panel) -> None:
     for (name, values), look in zip(moving.items(), looks(len(moving)), strict=True):
         axes.plot(time, values, drawstyle="steps-post" if panel.held else "default", label=symbol(name), **look)
     axes.set_ylabel(axis_label(panel.name, panel.unit).replace(" (", "\n("))
-    axes.yaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
+    ticks(axes.yaxis, 3, steps=[1, 2, 5, 10])
     if len(moving) > 1:
         axes.legend(
             loc="lower right",

@@ -6,16 +6,25 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
-from koopcli.figures.colours import COLOURS, GUIDE
-from koopcli.figures.drawing import Source, column, with_error
-from koopcli.figures.style import COLUMN, legend_below, plain_numbers, style
+from koopcli.figures.kit.figure import FigureKind, Source, column, with_error
+from koopcli.figures.kit.style import COLOURS, COLUMN, GUIDE, Figure, legend_below, plain_numbers, style
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.koopman.scores.evaluation import Evaluation
 from koopcli.records import Array, FloatArray
+
+FIGURE = FigureKind(
+    about="errors and the bounds that the predictor gives for them",
+    takes="evaluation",
+    behind=("predictor",),
+    makes=lambda recipes, experiment: [
+        recipes.evaluation(experiment, recipes.fit_eigen(recipes.best_eigen(experiment)))
+    ],
+    only="fit-eigen",
+    instead="it draws the experiment best-eigen; name an evaluation to choose another",
+)
 
 SMALLEST = 1e-6  # percent: what is drawn of an error of nothing
 PARTS = 5  # of the states by their bounds, each with its own share

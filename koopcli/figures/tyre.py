@@ -6,14 +6,37 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
+from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Plot, Tyres
-from koopcli.figures.colours import GUIDE
-from koopcli.figures.drawing import Source, column
-from koopcli.figures.style import COLUMN, legend_below, looks, plain, style
+from koopcli.errors import InvalidValueError
+from koopcli.figures.kit.figure import FigureKind, Recipes, Source, Task, column
+from koopcli.figures.kit.style import COLUMN, GUIDE, Figure, legend_below, looks, plain, style
 from koopcli.records import Array, FloatArray
+from koopcli.vehicles.handling import tyres_of, wheel_loads
+from koopcli.vehicles.parameters import TYRES
 from koopcli.vehicles.tyre import force
+
+OF_TYRES = ("m", "l_f", "l_r", "mu_scale", *TYRES)  # parameters that tyre forces depend on
+
+
+def _tyres(recipes: Recipes, experiment: Experiment, artefacts: Sequence[Task]) -> tuple[Tyres, ...]:
+    """The tyres of the experiment's vehicle and of those beside it. Raises ``InvalidValueError`` for one without."""
+    tyres = []
+    for name, driving in recipes.vehicles(experiment):
+        p = driving.vehicle
+        if p.lateral is None or p.longitudinal is None:
+            raise InvalidValueError(f"the vehicle {name} has no tyres: give its file [lateral] and [longitudinal]")
+        tyres.append(Tyres(name, wheel_loads(p), p.mu_scale, tyres_of(p, "lateral"), tyres_of(p, "longitudinal")))
+    return tuple(tyres)
+
+
+FIGURE = FigureKind(
+    about="tyre forces against slip, of the vehicle and of those shown beside it",
+    takes="nothing",
+    told={"tyres": _tyres},
+    parameters=OF_TYRES,
+)
 
 LARGEST_ANGLE, LARGEST_RATIO = np.deg2rad(30.0), 0.5
 POINTS = 401

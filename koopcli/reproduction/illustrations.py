@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from koopcli.config.changes import flat, parse_set
 from koopcli.errors import InvalidValueError, UsageError
-from koopcli.figures.drawing import Drawing
-from koopcli.figures.registry import FIGURES, FigureKind
+from koopcli.figures.kit.figure import Drawing, FigureKind
+from koopcli.figures.kit.registry import FIGURES
 from koopcli.reproduction.report import Picture, Plan, Run
-from koopcli.stages import drawn
+from koopcli.stages import figure_tasks
 from koopcli.stages.base import Task
 from koopcli.stages.effects import why_idle
 from koopcli.stages.naming import names
@@ -92,23 +92,23 @@ def command(run: Run, picture: Picture, draws: Sequence[Record]) -> str:
     """The command that makes a picture: by the figure's name where that makes it, else of the artefacts it draws."""
     task, name = picture.task, picture.task.settings.figure
     kind = FIGURES[name]
-    made = drawn.MADE[kind.made]
     words = ["koop", "plot", name]
     try:
-        alone = drawn.figure(name, made.tasks(run.experiment), task.settings.format, run.experiment)
+        alone = figure_tasks.figure(
+            name, figure_tasks.artefacts(name, run.experiment), task.settings.format, run.experiment
+        )
     except (UsageError, InvalidValueError):  # changes that hold for this method's samples and not for the figure's
         alone = None
     told = list(run.changes)
     if alone != task:
         words += [record.name for record in draws]
-        told = [one for one in told if kind.takes == "predictor" and one.startswith(drawn.TOLD_BESIDE)]
+        told = [one for one in told if kind.takes == "predictor" and one.startswith(figure_tasks.TOLD_BESIDE)]
         words += _labels(task, kind)
     if run.base != "paper" and (alone == task or kind.takes == "predictor"):
         words += ["--experiment", run.base]
-    reads = (*made.reads, *(f"plot.{field}" for field in kind.told))
     for one in told:
         ((setting, _),) = flat(parse_set([one]))
-        if why_idle(setting, run.experiment, [task], reads) is None:
+        if why_idle(setting, run.experiment, [task], kind.uses) is None:
             words += ["--set", one]
     return shlex.join([*words, "-o", f"{name}.{task.settings.format}"])
 

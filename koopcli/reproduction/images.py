@@ -6,7 +6,7 @@ import base64
 import io
 from urllib.parse import quote
 
-from koopcli.figures.drawing import Drawing
+from koopcli.figures.kit.figure import Drawing
 
 IN_A_URI = " /:;=,()'-+.*!~@$?[]{}|^_"  # of SVG: what needs no escape inside an attribute
 COLOURS, COMPRESSION = 256, 6  # of a shrunk PNG; more compression takes three times as long for a twelfth

@@ -7,7 +7,7 @@ from functools import partial
 from html import escape
 from itertools import zip_longest
 
-from koopcli.figures.registry import FIGURES
+from koopcli.figures.kit.registry import FIGURES
 from koopcli.reproduction.columns import aligned, is_numeric
 from koopcli.reproduction.illustrations import Illustration, provenance
 from koopcli.reproduction.images import address

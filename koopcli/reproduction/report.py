@@ -8,16 +8,16 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from koopcli.config.experiment import Experiment
-from koopcli.config.pictures import FigureName, ImageFormat
+from koopcli.config.pictures import ImageFormat
 from koopcli.records import Meta
-from koopcli.stages import drawn
+from koopcli.stages import figure_tasks
 from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline
 from koopcli.store import Record
 from koopcli.vehicles.plants import PLANTS
 
 REDUCED = "This run is not of the paper's size: its numbers cannot be put beside the paper's."
-RASTERS: frozenset[FigureName] = frozenset({"error-map", "error-side", "energy-surface", "density", "spectrum"})
+RASTERS = frozenset({"error-map", "error-side", "energy-surface", "density", "spectrum"})
 # figures of thousands of marks, which are smaller as PNG at the paper's size; all others are smaller as SVG
 SMALLEST, LARGEST = 5, 6  # powers of ten between which numbers are written without one
 
@@ -236,9 +236,9 @@ def score_text(figures: Meta | None) -> str:
 def drawer(experiment: Experiment) -> Callable[..., Task]:
     """``(figure, artefacts, labels=…)`` -> its task for the report of an experiment, in the format that is smaller."""
 
-    def draw(figure: FigureName, artefacts: Sequence[Task], labels: Mapping[Task, str] | None = None) -> Task:
+    def draw(figure: str, artefacts: Sequence[Task], labels: Mapping[Task, str] | None = None) -> Task:
         image: ImageFormat = "png" if figure in RASTERS else "svg"
-        return drawn.figure(figure, artefacts, image, experiment, labels=labels)
+        return figure_tasks.figure(figure, artefacts, image, experiment, labels=labels)
 
     return draw
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from koopcli.checks import taken, written
-from koopcli.config.experiment import KINDS, Experiment
+from koopcli.config.declared import KINDS
+from koopcli.config.experiment import Experiment
 from koopcli.errors import KoopError
+from koopcli.figures.kit.registry import FIGURES
+from koopcli.simulation.samples.sample import SampleChoice
 from koopcli.stages.base import Task
 
 Plan = Callable[[Experiment], Sequence[Task]]
@@ -60,20 +63,27 @@ def _reason(name: str, tasks: Sequence[Task], steps: Sequence[Task]) -> str:
     """Why nothing depends on a setting, in words."""
     section, _, key = name.partition(".")
     samples = [step.settings for step in steps if step.stage == "sample"]
-    plants = list(dict.fromkeys(step.settings.plant.kind for step in steps if step.stage == "simulate"))
-    used = {step.stage for step in steps} | ({"test"} if samples else set()) | ({"vehicle"} if plants else set())
-    if section not in used and not (section in ("vehicle", "simulate") and any(taken(type(one)) for one in samples)):
-        if tasks[0].stage == "plot":
-            return f"the figure '{tasks[0].settings.figure}' draws nothing of it"
-        if section == "experiment":
-            return "the fit is named"
-        if section == "vehicle" and samples:
-            return f"a sample of kind '{samples[0].kind}' does not depend on the vehicle"
-        return "nothing is made by it"
-    if section in KINDS and "." in key and key.partition(".")[0] not in {one.kind for one in samples}:
-        return f"no {section} of kind '{key.partition('.')[0]}' is used"
+    plants = [step.settings.plant.kind for step in steps if step.stage == "simulate"]
+    used = {step.stage for step in steps} | ({"test"} if samples else set())
+    used |= {"vehicle", "simulate"} if plants or any(taken(type(sample)) for sample in samples) else set()
+    figure = tasks[0].settings.figure if tasks[0].stage == "plot" else ""
+    if section not in used:
+        return _not_behind(section, figure, samples)
+    kind = key.partition(".")[0]
+    if section in KINDS and "." in key and kind not in {sample.kind for sample in samples}:
+        return f"no {section} of kind '{kind}' is used"
+    if section in KINDS and "none" in {getattr(sample, "excitation", "") for sample in samples}:
+        return "the excitation 'none' has no use for it"
     if section in ("vehicle", "simulate") and plants:
         return f"the plant '{plants[0]}' has no use for it"
-    if section in KINDS and {getattr(one, "excitation", "") for one in samples} & {"none"}:
-        return "the excitation 'none' has no use for it"
-    return "the same is made without it"
+    instead = FIGURES[figure].instead if figure else ""
+    return f"the figure '{figure}' chooses it: {instead}" if instead else "the same is made without it"
+
+
+def _not_behind(section: str, figure: str, samples: Sequence[SampleChoice]) -> str:
+    """Why a setting of another stage than those that are behind a task changes nothing."""
+    if figure:
+        return f"the figure '{figure}' draws nothing of it"
+    if section == "vehicle" and samples:
+        return f"a sample of kind '{samples[0].kind}' does not depend on the vehicle"
+    return "the fit is named" if section == "experiment" else "nothing is made by it"

@@ -5,8 +5,7 @@ from __future__ import annotations
 from koopcli import __version__
 from koopcli.checks import build
 from koopcli.config.pictures import Plot
-from koopcli.figures.drawing import Drawing
-from koopcli.figures.registry import drawing
+from koopcli.figures.kit.figure import Drawing, drawing
 from koopcli.records import Meta
 from koopcli.stages.base import Context, Cost, Inputs, Stage
 

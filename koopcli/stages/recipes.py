@@ -9,31 +9,19 @@ from typing import get_args
 
 from koopcli.checks import restored
 from koopcli.config.experiment import Experiment, load_experiment
-from koopcli.config.pictures import Tyres
 from koopcli.config.settings import Baseline, BaselineKind, FitName, Simulate
-from koopcli.errors import InvalidValueError
 from koopcli.koopman.edmd.fit import FitEdmd
 from koopcli.koopman.eigen.fit import FitEigen
-from koopcli.koopman.eigen.windows import AlongTrajectory
 from koopcli.records import Meta
-from koopcli.simulation.samples.greedy import GreedySample
-from koopcli.simulation.samples.grid import GridSample
 from koopcli.simulation.samples.point import PointSample
 from koopcli.simulation.samples.sample import SampleChoice
 from koopcli.stages.base import Task
 from koopcli.stages.makers import MAKERS
 from koopcli.stages.usable import as_inputs
-from koopcli.vehicles.handling import tyres_of, wheel_loads
-from koopcli.vehicles.parameters import TYRES
 from koopcli.vehicles.plants import PLANTS
 
 FITS = tuple(MAKERS)
-BESIDE = (
-    FitEdmd.of(basis="states"),
-    FitEdmd.of(order=3),
-    FitEdmd.of(order=5),
-)  # EDMD of any trajectories, for comparison
-OF_TYRES = ("m", "l_f", "l_r", "mu_scale", *TYRES)  # parameters that tyre forces depend on
+BESIDE = (FitEdmd.of(basis="states"), FitEdmd.of(order=3), FitEdmd.of(order=5))  # of any trajectories, to compare with
 
 
 def sample(settings: SampleChoice) -> Task:
@@ -128,28 +116,6 @@ def with_order(experiment: Experiment, order: int) -> Experiment:
     return replace(experiment, fit_edmd=experiment.fit_edmd.but(order=order))
 
 
-def order_sweep(experiment: Experiment) -> list[Task]:
-    """One evaluation for each order of the experiment's sweep. Raises ``InvalidValueError`` for a basis without any."""
-    basis = experiment.fit_edmd.basis
-    if not hasattr(basis, "order"):
-        raise InvalidValueError(f"the basis '{basis.kind}' has no order to sweep: choose polynomials")
-    fits = (fit_edmd(with_order(experiment, order)) for order in experiment.reproduce.orders)
-    return [evaluation(experiment, fit) for fit in fits]
-
-
-def draw_sweep(experiment: Experiment) -> list[Task]:
-    """One evaluation for each order of the sweep, on each of many random training grids."""
-    grid = experiment.sample("grid")
-    if not isinstance(grid, GridSample):
-        raise InvalidValueError("training draws are those of a grid: sample.kind must be 'grid'")
-    found = []
-    for seed in range(experiment.reproduce.full_draws):
-        training = simulation(experiment, sample(replace(grid, seed=seed)))
-        fits = (fit_edmd(with_order(experiment, order), training) for order in experiment.reproduce.orders)
-        found += [evaluation(experiment, fit) for fit in fits]
-    return found
-
-
 DEGREES = (1, 2, 3)  # of the lattice, where modes are swept
 
 
@@ -161,47 +127,12 @@ def mode_fits(fit: FitEigen, pairs: Sequence[int]) -> list[FitEigen]:
     ]
 
 
-def mode_sweep(experiment: Experiment) -> list[Task]:
-    """One evaluation for each number of rates, of every kind; the best boundary values unless windows are fitted."""
-    fit = experiment.fit_eigen
-    if isinstance(fit.window, AlongTrajectory):
-        fit = fit.but(boundary="optimal")
-    fits = mode_fits(fit, experiment.reproduce.pairs)
-    return [evaluation(experiment, fit_eigen(replace(experiment, fit_eigen=one))) for one in fits]
-
-
 def best_eigen(there: Experiment, budget: float | None = None) -> Experiment:
     """The experiment with the sample and the fit of best-eigen, for its own vehicle and period and its main budget."""
     main = there.reproduce.budgets[0]
     best = load_experiment("best-eigen", {"sample": {"greedy": {"budget": main if budget is None else budget}}})
     simulate = replace(there.simulate, plant=None, steps=None)
     return replace(best, simulate=simulate, evaluate=there.evaluate)
-
-
-def improved(experiment: Experiment) -> list[Task]:
-    """The paper's reading with the best boundary values, and the best predictor."""
-    paper = replace(
-        experiment, fit_eigen=FitEigen.of(boundary="optimal", cut=1e-10, tabulate=experiment.fit_eigen.tabulate)
-    )
-    return [fit_eigen(paper, simulation(paper, plant="slips")), fit_eigen(best_eigen(experiment))]
-
-
-def budget_sweep(experiment: Experiment) -> list[Task]:
-    """The best predictor on every budget, with and without mirror images, for every vehicle shown."""
-    found = []
-    for _, there in vehicles(experiment):
-        for budget in experiment.reproduce.budgets:
-            best = best_eigen(there, budget)
-            for mirrored in (True, False):
-                states = best.sample("greedy")
-                assert isinstance(states, GreedySample)
-                chosen = replace(states, mirror=states.mirror if mirrored else ())
-                fit = replace(best.fit_eigen, mirror=best.fit_eigen.mirror if mirrored else ())
-                training = simulation(best, sample(chosen), plant="slips")
-                trained = fit_eigen(replace(best, fit_eigen=fit), training)
-                test = test_set(experiment, trained.ancestor("simulate").settings)
-                found.append(evaluation(experiment, trained, test))
-    return found
 
 
 def side_by_side(experiment: Experiment) -> list[Task]:
@@ -211,17 +142,6 @@ def side_by_side(experiment: Experiment) -> list[Task]:
     main = predictor(experiment, "fit-eigen")
     others = beside(experiment, main.input("trajectories"))
     return [evaluation(experiment, one) for one in dict.fromkeys((main, *others))]
-
-
-def tyres(experiment: Experiment) -> tuple[Tyres, ...]:
-    """The tyres of the experiment's vehicle and of those beside it. Raises ``InvalidValueError`` for one without."""
-    found = []
-    for name, there in vehicles(experiment):
-        p = there.vehicle
-        if p.lateral is None or p.longitudinal is None:
-            raise InvalidValueError(f"the vehicle {name} has no tyres: give its file [lateral] and [longitudinal]")
-        found.append(Tyres(name, wheel_loads(p), p.mu_scale, tyres_of(p, "lateral"), tyres_of(p, "longitudinal")))
-    return tuple(found)
 
 
 def vehicles(experiment: Experiment) -> list[tuple[str, Experiment]]:

@@ -26,10 +26,10 @@ def subject(artefacts: Sequence[Task], simulated: Callable[[Task], Simulate]) ->
     return Subject(tuple(vehicles), tuple(outlook(one).name for one in predictors))
 
 
-def of_tyres(experiment: Experiment) -> Subject:
-    """The vehicles whose tyres are drawn."""
+def of_vehicles(experiment: Experiment, parameters: Sequence[str]) -> Subject:
+    """The experiment's vehicles, of which ``parameters`` are drawn."""
     there = (one.vehicle for _, one in recipes.vehicles(experiment))
-    return Subject(tuple(dict.fromkeys(fingerprint(vehicle, recipes.OF_TYRES) for vehicle in there)))
+    return Subject(tuple(dict.fromkeys(fingerprint(vehicle, tuple(parameters)) for vehicle in there)))
 
 
 def _simulations(

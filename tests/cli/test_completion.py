@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from typing import get_args
 
 import pytest
 
 from koopcli.__main__ import main
 from koopcli.cli import completion
-from koopcli.config.pictures import FigureName
+from koopcli.figures import NAMES
 
 
 @pytest.fixture
@@ -35,7 +34,7 @@ def test_all_stages_are_known_to_the_completion():
 
 
 def test_names_that_never_change_complete(complete, folder):
-    assert complete("plot", "") == list(get_args(FigureName))
+    assert complete("plot", "") == NAMES
     assert complete("plot", "best") == ["best-order"]
     assert complete("ls", "fit") == ["fit-edmd", "fit-eigen"]
     assert complete("evaluate", "--experiment", "sm") == ["smoke"]
@@ -46,11 +45,15 @@ def test_names_that_never_change_complete(complete, folder):
 
 def test_artefacts_complete_in_the_store_that_is_named(complete, koop, folder):
     name, other = koop("sample").name, koop("sample", "--store", "elsewhere", "--seed", "5").name
-    for command in (["show"], ["simulate"], ["evaluate", "--on"], ["plot", "orders"]):
+    for command in (["show"], ["simulate"], ["evaluate", "--on"], ["plot", "energy-surface"]):
         assert complete(*command, "sam") == [name]
     assert complete("show", "--store", "elsewhere", "sam") == [other]
+    fit = koop("fit-edmd").name
+    for figure, names in (("spectrum", [fit]), ("energy-surface", [name]), ("orders", []), ("tyre", [])):
+        assert complete("plot", figure, "") == names
+    assert set(complete("plot", "no-such-figure", "")) >= {name, fit}
     (folder / "artefacts" / "records" / "\x1b[2J").mkdir()
-    assert complete("show", "fit") == []
+    assert complete("show", "eval") == []
 
 
 def test_a_store_that_cannot_be_read_has_no_names(complete, folder):
@@ -60,11 +63,19 @@ def test_a_store_that_cannot_be_read_has_no_names(complete, folder):
     assert complete("show", "--store", "~nouser/x", "s") == []
 
 
-def test_completion_needs_no_numerics(folder):
+@pytest.mark.parametrize(
+    ("words", "unneeded"),
+    [
+        ("koop show sample", {"numpy"}),
+        ("koop plot err", {"numpy"}),
+        ("koop plot error-map eval", set()),  # what a figure takes stands in its file
+    ],
+)
+def test_completion_needs_no_numerics(folder, words, unneeded):
     code = (
         "import sys; from koopcli.__main__ import main; main([]); "
-        "print(sorted({'numpy', 'scipy', 'h5py', 'matplotlib', 'filelock'} & set(sys.modules)))"
+        f"print(sorted({unneeded | {'scipy', 'h5py', 'matplotlib', 'filelock'}!r} & set(sys.modules)))"
     )
-    asked = {"COMP_WORDS": "koop show sample", "COMP_CWORD": "2", "_KOOP_COMPLETE": "complete_bash"}
+    asked = {"COMP_WORDS": words, "COMP_CWORD": str(words.count(" ")), "_KOOP_COMPLETE": "complete_bash"}
     done = subprocess.run([sys.executable, "-c", code], env=asked, capture_output=True, text=True, check=True)
     assert done.stdout.endswith("[]\n")

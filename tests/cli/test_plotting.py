@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from koopcli.config.data import data_folder
-from koopcli.figures.registry import FIGURES
+from koopcli.figures.kit.registry import FIGURES
 from koopcli.koopman.scores import metrics
 from tests.cli.test_errors import one_line
 

@@ -1,11 +1,12 @@
-"""What holds for every figure: asked of the registry, so that a new one is covered by its line there."""
+"""What holds for every figure: a new file in the folder is covered at once."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+import subprocess
+import sys
+from dataclasses import fields, replace
 from functools import cache
-from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,14 +17,17 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from koopcli.config.pictures import ImageFormat
+from koopcli.config.pictures import ImageFormat, Plot
 from koopcli.config.shipped import called
 from koopcli.errors import InvalidValueError
-from koopcli.figures import style
-from koopcli.figures.colours import COLOURS
-from koopcli.figures.drawing import Drawing, sources_of
-from koopcli.figures.registry import FIGURES, drawing
-from koopcli.stages.drawn import MADE, TAKES, TOLD
+from koopcli.figures import module_of
+from koopcli.figures.kit import style
+from koopcli.figures.kit.figure import TAKES, Drawing, drawing, sources_of
+from koopcli.figures.kit.registry import FIGURES
+from koopcli.figures.kit.style import COLOURS
+from koopcli.stages.makers import LIFTED, MAKERS
+from koopcli.stages.naming import AXES
+from koopcli.stages.registry import STAGES
 from tests.stages.toys import figure_records, figure_settings
 
 SKETCHES = ("single-track",)  # drawn without axes
@@ -35,7 +39,7 @@ EVALUATED = [name for name, kind in FIGURES.items() if kind.takes == "evaluation
 
 @cache
 def drawn(name):
-    module = import_module(f"koopcli.figures.{name.replace('-', '_')}")
+    module = module_of(name)
     settings = figure_settings(name)
     shown = module.select(sources_of(settings, figure_records(name)), settings)
     return module.draw(shown), module.numbers(shown)
@@ -57,12 +61,31 @@ def pictured(name, image):
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_its_line_names_what_there_is(name):
+def test_it_declares_what_there_is(name):
     kind = FIGURES[name]
-    assert kind.takes in TAKES
-    assert kind.made in MADE
-    assert set(kind.told) <= set(TOLD)
     assert not kind.about.endswith(".")
+    assert set(kind.stages) <= set(STAGES)
+    assert set(kind.behind) <= {"predictor", "trajectories", "training"}
+    assert kind.against in AXES
+    assert set(kind.told) <= {field.name for field in fields(Plot)}
+    assert not (kind.usual and kind.only)
+    assert bool(kind.usual or kind.only) == (kind.takes in ("evaluation", "predictor", "fit", "sweep"))
+    assert bool(kind.fixed) == bool(kind.instead)
+    assert f"| `{name}` |" in (Path(__file__).parents[2] / "docs" / "figures.md").read_text()
+
+
+def test_figures_are_listed_without_matplotlib():
+    code = (
+        "import sys; from koopcli.__main__ import main; main(['plot', '--list']); "
+        "print(sorted({'matplotlib', 'mpl_toolkits', 'scipy', 'h5py'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(FIGURES) <= set(done.stdout.split())
+    assert done.stdout.endswith("[]\n")
+
+
+def test_what_a_figure_takes_is_what_stages_make():
+    assert (TAKES["predictor"], TAKES["fit"]) == (tuple(MAKERS), LIFTED)
 
 
 @pytest.mark.parametrize(
@@ -175,7 +198,7 @@ def test_single_lost_trajectories_are_left_out(name):
         return replace(record, rmse=rmse)
 
     records = {role: one_lost(record) for role, record in figure_records(name).items()}
-    module, settings = import_module(f"koopcli.figures.{name.replace('-', '_')}"), figure_settings(name)
+    module, settings = module_of(name), figure_settings(name)
     numbers = module.numbers(module.select(sources_of(settings, records), settings))
     assert all(np.isfinite(array.values).all() for array in numbers.values())
 
@@ -186,7 +209,7 @@ def test_one_lost_among_several_is_named_and_costs_the_others_nothing(name):
     whole = records["1/evaluation"]
     lost = {**records, "0/evaluation": replace(whole, diverged=np.ones(len(whole.rmse), dtype=bool))}
     settings = figure_settings(name)
-    module = import_module(f"koopcli.figures.{name.replace('-', '_')}")
+    module = module_of(name)
     (first, second), (_, alone) = (module.select(sources_of(settings, inputs), settings) for inputs in (lost, records))
     for field in vars(alone).keys() - {"edges", "share"}:  # bins are those of all that is drawn
         assert np.array_equal(getattr(second, field), getattr(alone, field)), field
@@ -210,7 +233,13 @@ def test_a_changed_drawing_has_another_key(monkeypatch):
 
     code = figures.drawing_code()
     names = {f"{path.parent.name}/{path.name}" for path in code}
-    assert names >= {"figures/style.py", "config/paper.py", "simulation/sampling.py", "vehicles/tyre.py"}
+    assert names >= {
+        "figures/orders.py",
+        "kit/style.py",
+        "config/paper.py",
+        "simulation/sampling.py",
+        "vehicles/tyre.py",
+    }
     assert all(path.is_file() for path in code)
     before, read = figures.source_digest.__wrapped__(), Path.read_bytes
     assert figures.source_digest.__wrapped__() == before

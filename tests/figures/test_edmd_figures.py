@@ -10,7 +10,7 @@ import pytest
 from koopcli.config.pictures import Plot
 from koopcli.errors import InvalidValueError
 from koopcli.figures import orders, random_input, spectrum
-from koopcli.figures.drawing import Source
+from koopcli.figures.kit.figure import Source
 from koopcli.figures.orders import OrderErrors
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
@@ -187,7 +187,7 @@ def grid_of(names, values, places, mean):
 
 def sweep_of(table):
     from koopcli.figures import sweep
-    from koopcli.figures.drawing import Source
+    from koopcli.figures.kit.figure import Source
 
     shown = sweep.select([Source("", None, {"sweep": table})], None)
     assert sweep.numbers(shown)

@@ -20,8 +20,8 @@ from koopcli.figures import (
     mean_trajectory,
     rmse_histogram,
 )
-from koopcli.figures.drawing import Source
-from koopcli.figures.ends import apart
+from koopcli.figures.kit.ends import apart
+from koopcli.figures.kit.figure import Source
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.scores.evaluation import evaluate
 from koopcli.records import Sample

@@ -9,7 +9,7 @@ import pytest
 
 from koopcli.config.pictures import Cone
 from koopcli.figures import single_track, trajectory, tyre
-from koopcli.figures.drawing import Source
+from koopcli.figures.kit.figure import Source
 from koopcli.records import Trajectories
 from koopcli.simulation.manoeuvres import MANOEUVRES, OFFSET
 from koopcli.vehicles.handling import wheel_loads
@@ -103,6 +103,11 @@ def test_what_never_changes_has_no_panel_but_is_said():
     labels = [axes.get_ylabel() for axes in figure.axes]
     assert labels[1:] == ["yaw rate\n(rad/s)", "$a_{y}$\n(m/s²)", "steer f\n(rad)"]
     assert figure.axes[0].get_title() == "constant: car, front rim, rear rim 20 m/s; drive f 5 N m"
+    data = lane_change()
+    data.u[..., 2:] = [6.0, 0.0, 7.0, 8.0]
+    title = course_of(data)[1].axes[0].get_title().replace("\n", " ")
+    assert title.endswith("drive f 5 N m; brake f 6 N m; drive r 7 N m; brake r 8 N m")  # in the order of the inputs
+
     _, coasting = course_of(lane_change(torque=0.0))
     assert "drive" not in coasting.axes[0].get_title()
 

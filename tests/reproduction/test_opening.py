@@ -9,7 +9,7 @@ import pytest
 
 from koopcli.config.experiment import load_experiment
 from koopcli.errors import InvalidValueError
-from koopcli.figures.drawing import Drawing
+from koopcli.figures.kit.figure import Drawing
 from koopcli.reproduction import edmd, eigen
 from koopcli.reproduction.illustrations import Illustration, illustrate
 from koopcli.reproduction.opening import Part, lead_picture, opening, screen

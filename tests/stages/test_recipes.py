@@ -8,9 +8,8 @@ from koopcli.config.changes import parse_set
 from koopcli.config.experiment import load_experiment
 from koopcli.config.grids import parse_grid
 from koopcli.errors import InvalidValueError
-from koopcli.figures.registry import FIGURES
-from koopcli.stages import recipes
-from koopcli.stages.drawn import MADE
+from koopcli.figures.kit.registry import FIGURES
+from koopcli.stages import figure_tasks, recipes
 from koopcli.stages.grid import cells
 
 FITS = ("fit-edmd", "fit-eigen")
@@ -36,23 +35,29 @@ def test_what_an_experiment_is_about_changes_no_recipe(fit):
     paper = load_experiment("paper", {})
     assert recipes.fit_edmd(about(fit)) == recipes.fit_edmd(paper)
     assert recipes.fit_eigen(about(fit)) == recipes.fit_eigen(paper)
-    assert recipes.order_sweep(load_experiment("paper", {})) == recipes.order_sweep(about(fit))
+    order_sweep = FIGURES["orders"].makes
+    assert order_sweep(recipes, paper) == order_sweep(recipes, about(fit))
 
 
-@pytest.mark.parametrize("name", dict.fromkeys(kind.made for kind in FIGURES.values()))
+@pytest.mark.parametrize("name", FIGURES)
 def test_a_figure_follows_the_experiment_or_is_for_one_fit(name):
     """One that makes no fit follows nothing; one that is for a fit says so where the experiment is about the other."""
-    made = MADE[name]
-    if made.fit is None:
-        assert all(made.tasks(about(fit)) == made.tasks(load_experiment("paper", {})) for fit in FITS)
-        return
+
+    def drawn(fit):
+        return figure_tasks.artefacts(name, about(fit))
+
+    kind, plain = FIGURES[name], figure_tasks.artefacts(name, load_experiment("paper", {}))
     for fit in FITS:
-        if made.follows:
-            assert made.tasks(about(fit))[0].find(fit) is not None
-        elif fit != made.fit:
-            with pytest.raises(InvalidValueError, match=f"experiment.fit={made.fit}"):
-                made.tasks(about(fit))
-    assert made.tasks(about(made.fit)) == made.tasks(load_experiment("paper", {}))
+        if kind.usual is not None:
+            assert drawn(fit)[0].find(fit) is not None
+        elif kind.only in (None, fit):
+            assert drawn(fit) == plain
+        else:
+            with pytest.raises(InvalidValueError, match=f"experiment.fit={kind.only}"):
+                drawn(fit)
+    assert all(task.stage in kind.stages for task in plain)
+    if kind.usual is not None:
+        assert drawn(kind.usual) == plain
 
 
 def test_a_sweep_follows_the_experiment_unless_a_method_is_named():

@@ -10,7 +10,7 @@ from koopcli.config.experiment import load_experiment
 from koopcli.config.shipped import called
 from koopcli.console import Console
 from koopcli.errors import UnknownNameError
-from koopcli.stages import drawn, recipes
+from koopcli.stages import figure_tasks, recipes
 from koopcli.stages import plot as plot_stage
 from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline
@@ -18,7 +18,7 @@ from koopcli.stages.subject import subject
 from koopcli.store import Store
 
 
-def said(*artefacts, simulated=drawn.simulated):
+def said(*artefacts, simulated=figure_tasks.simulated):
     of = subject(artefacts, simulated)
     return [called(one) for one in of.vehicles], list(of.predictors)
 
@@ -46,7 +46,7 @@ def test_a_predictor_whose_trajectories_are_gone_remembers_its_vehicle():
     assert said(alone) == ([], ["eigenfunctions, thin-plate"])  # nobody remembers
     assert said(Task("evaluate", recipes.evaluation(experiment, fit).settings)) == ([], [])
     with pytest.raises(UnknownNameError):
-        drawn.simulated(alone)
+        figure_tasks.simulated(alone)
 
 
 def test_a_stored_picture_keeps_the_line_it_was_drawn_with(tmp_path, monkeypatch):
@@ -55,7 +55,7 @@ def test_a_stored_picture_keeps_the_line_it_was_drawn_with(tmp_path, monkeypatch
 
     def picture():
         console = Console()
-        return Pipeline(Store(tmp_path, console.warn), console).make(drawn.figure("tyre", [], "svg", experiment))
+        return Pipeline(Store(tmp_path, console.warn), console).make(figure_tasks.figure("tyre", [], "svg", experiment))
 
     monkeypatch.setattr(plot_stage, "__version__", "1.0")
     first = picture()

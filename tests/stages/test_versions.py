@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from koopcli.figures import style
+from koopcli.figures.kit import style
 from koopcli.simulation import integrate
 from koopcli.stages.registry import STAGES
 from tests.stages import toys

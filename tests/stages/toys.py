@@ -17,7 +17,7 @@ from koopcli.checks import build
 from koopcli.config.pictures import Cone, Plot, Series, Subject, Tyres
 from koopcli.config.settings import Baseline, Evaluate, Simulate, Sweep, SweepAxis
 from koopcli.config.shipped import fingerprint, used_by
-from koopcli.figures.registry import FIGURES
+from koopcli.figures.kit.registry import FIGURES
 from koopcli.koopman.bases.orthonormal import OrthonormalPolynomials
 from koopcli.koopman.bases.polynomial import Polynomial
 from koopcli.koopman.edmd.fit import FitEdmd

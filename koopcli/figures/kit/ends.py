@@ -8,10 +8,8 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 
-from koopcli.figures.style import LINE, SMALLEST
+from koopcli.figures.kit.style import LINE, SMALLEST, Axes
 from koopcli.records import FloatArray
 
 WIDEST = 17  # letters of a name in a line
@@ -38,6 +36,8 @@ def room_for(names: Sequence[str]) -> float:
 
 def name_ends(axes: Axes, ends: Sequence[End], height: float) -> None:
     """Write the names to the right of ``axes``, whose panel is ``height`` inches high and has its limits already."""
+    from matplotlib.lines import Line2D
+
     texts = [_wrapped(end.name) for end in ends]
     heights = np.array([room_for([end.name]) for end in ends]) / height
     to_axes = axes.transData + axes.transAxes.inverted()

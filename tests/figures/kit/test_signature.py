@@ -13,8 +13,8 @@ from matplotlib.textpath import TextPath
 from koopcli.config.experiment import vehicle_named
 from koopcli.config.pictures import Subject
 from koopcli.config.shipped import called, fingerprint, used_by
-from koopcli.figures import style
-from koopcli.figures.signature import LONGEST, signature
+from koopcli.figures.kit import style
+from koopcli.figures.kit.signature import LONGEST, signature
 
 CTU = vehicle_named("ctu-2020")
 

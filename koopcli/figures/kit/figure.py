@@ -1,21 +1,79 @@
-"""A drawn figure: its numbers and its image, with the same bytes for the same numbers."""
+"""What a figure is: what it says of itself, what it is given, and what is drawn of that."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import zip_longest
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Plot, Series
+from koopcli.config.settings import FitName
 from koopcli.content import Content
 from koopcli.errors import InvalidValueError
+from koopcli.figures import module_of
+from koopcli.figures.kit import style
+from koopcli.figures.kit.signature import signature
 from koopcli.records import Array, BoolArray, Channels, FloatArray, Packed
 
 LOST = " (all diverged)"  # after the name of one among several that has no error to draw
+Recipes = Any  # the module koopcli.stages.recipes, which is handed over: figures stand below the stages
+Task = Any  # of koopcli.stages.base, for the same reason
+Takes = Literal["evaluation", "predictor", "fit", "sample", "trajectories", "sweep", "nothing"]
+TAKES: dict[Takes, tuple[str, ...]] = {
+    "evaluation": ("evaluate",),
+    "predictor": (*get_args(FitName), "baseline"),
+    "fit": get_args(FitName),
+    "sample": ("sample",),
+    "trajectories": ("simulate",),
+    "sweep": ("sweep",),
+    "nothing": (),
+}  # the stages that make what a figure takes
+
+
+@dataclass(frozen=True)
+class FigureKind:
+    """A figure: what it shows, takes and is told, and what it makes when no artefact is named."""
+
+    about: str
+    """What it shows, in a line."""
+    takes: Takes
+    """The artefacts that it draws, a ``fit`` being a predictor with lifted states."""
+    behind: tuple[str, ...] = ()
+    """What else it reads of each: its ``predictor``, its ``trajectories`` (the test set), or its ``training``."""
+    draws: Literal["one", "beside", "points"] = "one"
+    """One artefact, several beside one another on one test set, or several as points of curves."""
+    against: str = "order"
+    """The axis of the points, one of ``koopcli.stages.naming.AXES``."""
+    kinds: tuple[str, ...] = ()
+    """The kinds of sample that it takes; all when left out."""
+    told: Mapping[str, Callable[[Recipes, Experiment, Sequence[Task]], Any]] = field(default_factory=dict)
+    """Fields of ``Plot`` that it uses, each with its value for the artefacts that are drawn."""
+    parameters: tuple[str, ...] = ()
+    """Parameters that it draws of the experiment's vehicles, where it takes no artefact."""
+    makes: Callable[[Recipes, Experiment], list[Task]] | None = None
+    """What it draws when nothing is named; when left out, the usual one of what it takes."""
+    usual: FitName | None = None
+    """Of one that can be drawn for either fit, the one that it makes unless the experiment is about the other."""
+    only: FitName | None = None
+    """The fit that it makes, of one that can be drawn for no other."""
+    instead: str = ""
+    """What to change instead of what it chooses itself."""
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """The records that it reads of each artefact, that of the artefact itself first."""
+        itself = {"nothing": (), "fit": ("predictor",)}.get(self.takes, (self.takes,))
+        return (*itself, *self.behind)
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """The stages that make what it takes."""
+        return TAKES[self.takes]
 
 
 @dataclass(frozen=True)
@@ -69,6 +127,14 @@ class Drawing(Content):
             numbers,
             packed.arrays["image"].values[...].tobytes(),
         )
+
+
+def drawing(settings: Plot, inputs: Mapping[str, Any], version: str = "") -> Drawing:
+    """The figure that ``settings`` ask for, from records by ``number/role``, as this ``version`` of koop draws it."""
+    module = module_of(settings.figure)
+    shown = module.select(sources_of(settings, inputs), settings)
+    image = style.render(module.draw(shown), settings.format, signature(settings.of, version))
+    return Drawing(settings.figure, settings.format, module.numbers(shown), image)
 
 
 def column(values: npt.ArrayLike, axis: str, unit: str) -> Array:

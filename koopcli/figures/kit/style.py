@@ -5,19 +5,37 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from importlib import import_module
 from textwrap import fill, wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from matplotlib import style as matplotlib_style
-from matplotlib.axis import Axis
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
-from matplotlib.transforms import Bbox
-from mpl_toolkits.mplot3d import Axes3D
-
-from koopcli.figures.colours import COLOURS, DASHES, GUIDE
-from koopcli.figures.signature import LONGEST
+from koopcli.figures.kit.signature import LONGEST
 from koopcli.text import printable
+
+if TYPE_CHECKING:
+    from matplotlib import axes, figure
+    from matplotlib.axis import Axis
+    from mpl_toolkits.mplot3d import Axes3D
+
+    Axes = axes.Axes
+    Figure = figure.Figure
+else:  # a figure is declared without matplotlib, which is imported when the first one is drawn
+
+    def Figure(**look: Any) -> Any:  # noqa: D103
+        return import_module("matplotlib.figure").Figure(**look)
+
+    Axes = Any
+
+# Okabe and Ito's palette: distinct to every common form of colour vision
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+MARKERS = ("o", "s", "^", "D", "v", "P")
+DASHES = ("-", "--", ":")
+PAPER = "#000000"
+TRAINING = "#bbbbbb"
+GUIDE = "#888888"  # what is not data: axes through zero, the unit circle, restarts
+OTHERS = ("#555555", "#999999")  # lines that another one is set beside
+BAND = "#b9d7ea"  # what most of the data lie in
+SHADES = "viridis_r"  # even in lightness, dark where errors are large
 
 COLUMN = 3.5  # inches, one column of a two-column page
 DOTS = 300  # per inch, of a png
@@ -81,8 +99,17 @@ def legend_below(figure: Figure, title: str | None = None, columns: int = 2, **l
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, title=title, **look)
 
 
+def ticks(axis: Axis, *most: int, **look: Any) -> None:
+    """At most so many intervals between round numbers along an axis; ``look``: as ``MaxNLocator`` takes it."""
+    from matplotlib.ticker import MaxNLocator
+
+    axis.set_major_locator(MaxNLocator(*most, **look))
+
+
 def plain_numbers(axis: Axis) -> None:
     """Numbers on a logarithmic axis as people write them, 0.1 and 20 rather than powers of ten."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
     low, high = axis.get_view_interval()
     if high < NARROW * low:
         axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -99,7 +126,7 @@ def in_space(axes: Axes3D, names: Sequence[str], zoom: float) -> None:
         axis.labelpad = -6 if axis is axes.zaxis else -7
         axis.set_tick_params(pad=-2)
         axis.pane.set_facecolor("white")
-        axis.set_major_locator(MaxNLocator(4))
+        ticks(axis, 4)
 
 
 def symbol(name: str) -> str:
@@ -115,7 +142,9 @@ def axis_label(name: str, unit: str) -> str:
 
 def style() -> AbstractContextManager[None]:
     """The style for the time of a ``with``, over matplotlib's own defaults: a user's matplotlibrc changes nothing."""
-    return matplotlib_style.context(["default", STYLE])
+    from matplotlib import style as of_matplotlib
+
+    return of_matplotlib.context(["default", STYLE])
 
 
 UNDATED: dict[str, dict[str, None]] = {
@@ -129,6 +158,8 @@ def render(figure: Figure, image: str, line: str) -> bytes:
     """The figure as a png, svg or pdf file, with a grey ``line`` in a strip of its own below all that is drawn; the
     same figure gives the same bytes.
     """
+    from matplotlib.transforms import Bbox
+
     target = io.BytesIO()
     lines = wrap(line, LONGEST)
     width, height = figure.get_size_inches()

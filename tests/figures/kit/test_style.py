@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from koopcli.figures.style import plain
+from koopcli.figures.kit.style import plain
 
 
 def test_a_text_of_others_is_drawn_as_it_stands():

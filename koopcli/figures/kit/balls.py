@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from koopcli.figures.drawing import Source, column, state_columns, with_error
+from koopcli.figures.kit.figure import Source, column, state_columns, with_error
 from koopcli.koopman.scores.evaluation import Evaluation
 from koopcli.records import Array, Channels, FloatArray
 
