@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Literal, Self, TypeVar, Union, get_args, get_o
 from koopcli.errors import InvalidValueError, KoopError, MisplacedError, UsageError
 
 T = TypeVar("T")
+R = TypeVar("R")
 Values = dict[str, Any]
 SEED_LIMIT = 2**63 - 1
 
@@ -119,22 +120,27 @@ def taken_from(section: str) -> Any:
     return field(metadata={"section": section})
 
 
+def _cached(of: Callable[[type], R]) -> Callable[[type], R]:
+    """What is worked out ``of`` a class once: an experiment is built of thousands of settings."""
+    return cache(of)
+
+
 def taken(cls: type) -> dict[str, str]:
     """The fields of a settings class that are no settings, each with the section that it is taken from."""
-    return {f.name: f.metadata["section"] for f in fields(cls) if "section" in f.metadata}  # type: ignore[arg-type]
+    return {f.name: f.metadata["section"] for f in fields(cls) if "section" in f.metadata}
 
 
-@cache
+@_cached
 def choices(cls: type) -> dict[str, type[Choice]]:
     """The settings of a class that are choices, each with its base class."""
-    bare = {name: without_none(hint) for name, hint in hints_of(cls).items()}  # type: ignore[arg-type]
+    bare = {name: without_none(hint) for name, hint in hints_of(cls).items()}
     return {name: hint for name, hint in bare.items() if isinstance(hint, type) and issubclass(hint, Choice)}
 
 
-@cache
+@_cached
 def names_of(cls: type) -> tuple[str, ...]:
     """The settings of ``cls`` and of all kinds that it can choose."""
-    own = [f.name for f in fields(cls) if "help" in f.metadata]  # type: ignore[arg-type]
+    own = [f.name for f in fields(cls) if "help" in f.metadata]
     of_kinds = [name for base in choices(cls).values() for kind in base.kinds().values() for name in names_of(kind)]
     return tuple(dict.fromkeys([*own, *of_kinds]))
 
@@ -175,7 +181,7 @@ def restored(cls: type[T], values: Mapping[str, Any]) -> T:
     rest = dict(values)
     if issubclass(cls, Choice):
         cls = cls.kinds()[rest.pop("kind")]
-    hints = hints_of(cls)  # type: ignore[arg-type]
+    hints = hints_of(cls)
     beside = {name: coerce(hints[name], rest.pop(name), name, {}, COMMAND_LINE) for name in taken(cls) if name in rest}
     return build_layers(cls, [Layer(rest)], beside=beside)
 
@@ -307,13 +313,13 @@ def _checked(cls: type, layers: Sequence[Layer], prefix: str) -> Values:
                     layer.origin.say(f"unknown setting '{prefix}{key}'{candidates(key, names_of(cls))}")
                 )
     values: Values = {}
-    for f in fields(cls):  # type: ignore[arg-type]
+    for f in fields(cls):
         if f.name in choices(cls):
             values |= _checked_choice(cls, f.name, layers, prefix)
             continue
         for layer in layers:
             if f.name in layer.values:
-                value, hint = layer.values[f.name], hints_of(cls)[f.name]  # type: ignore[arg-type]
+                value, hint = layer.values[f.name], hints_of(cls)[f.name]
                 values[f.name] = coerce(hint, value, f"{prefix}{f.name}", f.metadata, layer.origin)
     return values
 
@@ -337,7 +343,7 @@ def _checked_choice(cls: type, name: str, layers: Sequence[Layer], prefix: str) 
 
 
 def _own(cls: type) -> set[str]:
-    return {f.name for f in fields(cls)}  # type: ignore[arg-type]
+    return {f.name for f in fields(cls)}
 
 
 def _elsewhere(name: str, key: str, section: str) -> str:
@@ -346,9 +352,9 @@ def _elsewhere(name: str, key: str, section: str) -> str:
     return f"'{name}' is {'the vehicle' if 'vehicle' in (key, section) else 'the simulation'}'s: {remedy}"
 
 
-@cache
-def hints_of(cls: Any) -> dict[str, Any]:
-    """The types of the fields of ``cls``, worked out once: an experiment is built of thousands of settings."""
+@_cached
+def hints_of(cls: type) -> dict[str, Any]:
+    """The types of the fields of ``cls``."""
     return get_type_hints(cls)
 
 

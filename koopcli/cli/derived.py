@@ -68,7 +68,7 @@ def _declared(classes: Sequence[type]) -> dict[str, list[Use]]:
     declared: dict[str, list[Use]] = {}
     for cls in classes:
         hints, kind = hints_of(cls), getattr(cls, "kind", "")
-        for f in fields(cls):  # type: ignore[arg-type]
+        for f in fields(cls):
             if f.name in taken(cls):
                 continue
             if f.metadata.get("option"):

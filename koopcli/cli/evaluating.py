@@ -23,7 +23,8 @@ from koopcli.cli.options import (
     WorkersOption,
 )
 from koopcli.config.changes import Changes, Values
-from koopcli.config.experiment import KINDS, Experiment
+from koopcli.config.declared import KINDS
+from koopcli.config.experiment import Experiment
 from koopcli.config.settings import Evaluate
 from koopcli.console import Console, show_table
 

@@ -35,13 +35,13 @@ if TYPE_CHECKING:
     from koopcli.stages.pipeline import Artefact
 
 KINDS = ordered(SampleChoice, GridSample)
-Kind = Literal[tuple(KINDS)]  # type: ignore[valid-type]
 
 
 @options_of(*KINDS.values(), but=("name",))
 def sample(
     kind: Annotated[
-        Kind | None, typer.Argument(metavar="|".join(KINDS), help=f"{said_of(KINDS)} ({GridSample.kind}).")
+        Literal[tuple(KINDS)] | None,  # type: ignore[valid-type]
+        typer.Argument(metavar="|".join(KINDS), help=f"{said_of(KINDS)} ({GridSample.kind})."),
     ] = None,
     name: Annotated[
         ManoeuvreName | None,

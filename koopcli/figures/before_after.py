@@ -10,10 +10,10 @@ import numpy as np
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Plot
-from koopcli.config.settings import FitEigen
 from koopcli.figures.kit.balls import LARGEST_SHOWN
 from koopcli.figures.kit.figure import LOST, FigureKind, Recipes, Source, Task, column, state_columns, with_error
 from koopcli.figures.kit.style import COLUMN, SHADES, Figure, axis_label, plain, plain_numbers, style, ticks
+from koopcli.koopman.eigen.fit import FitEigen
 from koopcli.koopman.scores.evaluation import Evaluation
 from koopcli.records import Array, Channels, FloatArray
 

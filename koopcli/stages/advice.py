@@ -109,7 +109,7 @@ def advise(case: Case) -> Advice:
             "no input moves in the training data, so the predictor knows nothing of them: sample some that do"
         )
     why = next(text for holds, text in REASONS if holds(case))
-    return Advice(why, PAGES.get(case.plant, ""), RULES.get(case.plant, lambda case: None)(case))
+    return Advice(why, PAGES.get(case.plant, ""), RULES[case.plant](case) if case.plant in RULES else None)
 
 
 REASONS: tuple[tuple[Callable[[Case], bool], str], ...] = (

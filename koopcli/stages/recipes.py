@@ -81,7 +81,7 @@ def test_set(experiment: Experiment, plant: Simulate, **changed: object) -> Task
     if experiment.evaluate.restart is not None and isinstance(plant.plant, PointSample.meant_for):
         kind = PointSample.kind
     there = replace(experiment, simulate=replace(experiment.simulate, dt=plant.dt))
-    settings = replace(there.test(kind, plant.vehicle), **changed)  # type: ignore[arg-type]
+    settings = replace(there.test(kind, plant.vehicle), **changed)  # type: ignore[type-var]
     return Task("simulate", replace(plant, steps=settings.horizon), (("sample", sample(settings)),))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from koopcli.config.plants import used_of
 
 from koopcli.config.changes import parse_set
 from koopcli.config.experiment import load_experiment, vehicle_named
@@ -14,6 +13,9 @@ from koopcli.config.words import plant_words, sample_words, vehicle_words
 from koopcli.simulation.samples.ellipsoid import EllipsoidSample
 from koopcli.simulation.samples.grid import GridSample
 from koopcli.vehicles.parameters import VehicleParameters
+from koopcli.vehicles.plants.forces import Forces
+from koopcli.vehicles.plants.slips import Slips
+from koopcli.vehicles.plants.wheels import Wheels
 
 CTU, RIMAC, BMW = (vehicle_named(name) for name in ("ctu-2020", "rimac-2018", "bmw-320i"))
 
@@ -22,7 +24,7 @@ def loaded(words):
     return load_experiment("paper", parse_set([f"{name}={value}" for name, value in words.items()]))
 
 
-@pytest.mark.parametrize("plant", ["forces", "slips", "wheels"])
+@pytest.mark.parametrize("plant", [Forces(), Slips(), Wheels()])
 @pytest.mark.parametrize(
     ("vehicle", "names"),
     [
@@ -32,30 +34,30 @@ def loaded(words):
     ],
 )
 def test_a_vehicle_comes_back_from_its_words(vehicle, names, plant):
-    words = vehicle_words(used_of(vehicle, plant), plant)
+    words = vehicle_words(plant.used(vehicle), plant)
     assert set(words) == names
-    assert used_of(loaded(words).vehicle, plant) == used_of(vehicle, plant)
+    assert plant.used(loaded(words).vehicle) == plant.used(vehicle)
 
 
 def test_single_coefficients_of_a_tyre_are_said():
     odd = replace(RIMAC, lateral=replace(RIMAC.lateral, mu=0.7))
-    assert vehicle_words(odd, "slips") == {"vehicle.name": "rimac-2018", "vehicle.lateral.mu": "0.7"}
+    assert vehicle_words(odd, Slips()) == {"vehicle.name": "rimac-2018", "vehicle.lateral.mu": "0.7"}
 
 
 def test_what_no_words_take_away_is_not_said():
     """Every shipped vehicle has tyres, and --set takes none off."""
     bare = VehicleParameters(m=1.0, Jzz=1.0, l_f=1.0, l_r=1.0, c_w=0.0, A=0.0, rho=0.0)
-    assert vehicle_words(bare, "slips") is None
-    assert vehicle_words(bare, "forces") is not None
+    assert vehicle_words(bare, Slips()) is None
+    assert vehicle_words(bare, Forces()) is not None
 
 
 def test_settings_at_their_defaults_are_not_said():
-    assert plant_words(Simulate(vehicle=CTU, plant="slips", steps=30).settled()) == {}
-    odd = Simulate(vehicle=CTU, plant="slips", dt=0.02, v_eps=0.2).settled()
+    assert plant_words(Simulate(vehicle=CTU).settled(Slips(), 30)) == {}
+    odd = Simulate(vehicle=CTU, dt=0.02).settled(Slips(v_eps=0.2), 30)
     words = plant_words(odd)
     assert words == {"simulate.v_eps": "0.2", "simulate.dt": "0.02"}
-    again = replace(loaded(words).simulate, plant="slips").settled()
-    assert (again.dt, again.v_eps) == (0.02, 0.2)
+    again = loaded(words)
+    assert (again.simulate.dt, again.plant_for(Slips)) == (0.02, Slips(v_eps=0.2))
     grid = GridSample(seed=3, levels=(1.0, 2.5), draw="even")
     words = sample_words(grid, ("seed", "levels", "box"))
     assert loaded({**words, "sample.draw": "even"}).sample("grid") == grid

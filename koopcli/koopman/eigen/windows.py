@@ -115,7 +115,7 @@ class Ahead(Window):
     )
     rounds: int = setting(0, low=0, high=100, help="how often short trajectories are continued by the predictor itself")
     trust: bool = setting(False, option=True, help="estimate errors from data held back, for a bound at every state")
-    cut: float | None = setting(None, low=0, high=0.5, option=True, help=boundary.CUT)  # type: ignore[assignment]
+    cut: float | None = setting(None, low=0, high=0.5, option=True, help=boundary.CUT)
 
     def name(self, how: FitEigen) -> str:
         """What a predictor with it is called."""

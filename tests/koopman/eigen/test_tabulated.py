@@ -32,7 +32,7 @@ def test_at_a_tabulated_sample_it_is_the_initial_lifted_state_carried_on(lift, p
     first[:, :, : starts.shape[2]] = starts
     A = np.kron(np.eye(5), modes.block)
     z = first.reshape(7, 20)
-    exact = lift.nodes.search.kind in ("nearest", "linear")
+    exact = lift.nodes.search.lift.kind in ("nearest", "linear")
     for k in range(11):
         assert lift.lift(states[:, k]) == pytest.approx(z, rel=1e-9, abs=1e-9 if exact else 1e-4)
         z = z @ A.T
