@@ -41,6 +41,7 @@ count = 25
 steps = 30
 [fit-edmd]
 order = 2
+[fit-edmd.basis.thin-plate]
 centres = 20
 [fit-eigen]
 centres = 20

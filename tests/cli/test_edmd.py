@@ -54,7 +54,7 @@ def test_every_way_to_fit_is_stored_and_scored(koop, folder, options, functions)
         (["--basis", "anisotropic", "--degree-velocity", "5"], 3, ["'fit-edmd.degree_velocity' 5 is too high for 5"]),
         (["--basis", "total", "--degree-velocity", "2"], 2, ["fit-edmd.basis 'total' has no use for it"]),
         (["--basis", "thin-plate", "--order", "3"], 2, ["fit-edmd.basis 'thin-plate' has no use for it"]),
-        (["--centres", "30"], 2, ["fit-edmd.basis 'tensor' has no use for it"]),
+        (["--centres", "30"], 2, ["'fit-edmd.centres' belongs to basis 'thin-plate', and this basis is 'tensor'"]),
         (["--terms", "cubic"], 2, ["'cubic' is not one of"]),
         (["--ridge", "-1"], 3, ["'fit-edmd.ridge' must be at least 0"]),
         (["--solver", "cholesky-monomials", "--ridge", "0.1"], 3, ["without 'fit-edmd.ridge'"]),

@@ -65,7 +65,11 @@ def one_line(result, code, *parts):
         (["evaluate", "--excitation", "none", "--amplitude", "5"], 2, "the excitation 'none' has no use for it"),
         (["fit-edmd", "--set", "vehicle.lateral.mu=2"], 2, "the plant 'forces' has no use for it"),
         (["fit-eigen", "--set", "simulate.force_per=wheel"], 2, "the plant 'slips' has no use for it"),
-        (["fit-eigen", "--boundary", "optimal", "--centres", "9"], 2, "'optimal' has no use for it"),
+        (
+            ["fit-eigen", "--boundary", "optimal", "--centres", "9"],
+            2,
+            "'fit-eigen.centres' belongs to boundary 'thin-plate', and this boundary is 'optimal'",
+        ),
         (["fit-edmd", "--set", "fit-edmd.basis=states", "--order", "3"], 2, "'states' has no use for it"),
         (["sample", "ellipsoid", "--count", "440"], 3, "must be a square such as 441 = 21²"),
         (["sample", "ellipsoid", "--draw", "even"], 2, "'sample.draw' belongs to kind 'grid'"),
@@ -98,7 +102,7 @@ def one_line(result, code, *parts):
         (
             ["reproduce", "--set", "fit-eigen.boundary=optimal", "--set", "fit-eigen.centres=7"],
             2,
-            "'optimal' has no use for it",
+            "'fit-eigen.centres' belongs to boundary 'thin-plate', and this boundary is 'optimal'",
         ),
         (["reproduce", "edmd", "--set", "fit-edmd.basis=states"], 3, "which the basis 'states' has none of"),
         (["reproduce", "--set", "sample.count=2"], 2, "say which, sample.grid.count or sample.ellipsoid.count"),

@@ -18,6 +18,8 @@ from koopcli.stages import ahead
 from tests import stock
 from tests.reproduction.pages import Page
 
+SPLINES = "fit-edmd.basis.thin-plate.centres=9"
+
 
 def test_the_table_the_report_and_the_pins(koop, folder, stocked):
     done = koop("reproduce", "edmd")
@@ -99,7 +101,12 @@ def test_the_figures_of_the_report_are_those_of_evaluate(koop, stocked):
         (),
         pytest.param(("fit-edmd.basis=total", "sample.levels=[1,50]"), marks=pytest.mark.slow),
         pytest.param(
-            ('reproduce.draws=["even"]', 'reproduce.excitations=["held"]', "fit-edmd.centres=9", "test.amplitude=500"),
+            (
+                'reproduce.draws=["even"]',
+                'reproduce.excitations=["held"]',
+                SPLINES,
+                "test.amplitude=500",
+            ),
             marks=pytest.mark.slow,
         ),
     ],

@@ -70,7 +70,6 @@ def test_it_declares_what_there_is(name):
     assert set(kind.told) <= {field.name for field in fields(Plot)}
     assert not (kind.usual and kind.only)
     assert bool(kind.usual or kind.only) == (kind.takes in ("evaluation", "predictor", "fit", "sweep"))
-    assert bool(kind.fixed) == bool(kind.instead)
     assert f"| `{name}` |" in (Path(__file__).parents[2] / "docs" / "figures.md").read_text()
 
 

@@ -24,6 +24,8 @@ TEXTS = {
     "yaw": "the yaw rate is tracked without error",
 }
 
+SPLINES = "fit-edmd.basis.thin-plate.centres=9"
+
 
 def figures(mean=3.0, yaw=1e-12, diverged=0, functions=27):
     return {"rmse": {"mean": mean}, "max_error": {"yaw_rate": yaw}, "diverged": diverged, "functions": functions}
@@ -132,7 +134,13 @@ def test_claims_that_a_smaller_sweep_cannot_judge_are_left_out():
 
 
 def test_commands_say_what_the_run_changed():
-    changes = ("reproduce.orders=[6]", "vehicle.Jzz=1731", "fit-edmd.centres=9", "test.amplitude=5", "plot.restart=9")
+    changes = (
+        "reproduce.orders=[6]",
+        "vehicle.Jzz=1731",
+        SPLINES,
+        "test.amplitude=5",
+        "plot.restart=9",
+    )
     run = replace(run_with(falling), base="./mine.toml", changes=changes)
     table = claims_table(replace(run, label="vehicle.Jzz=1731"))
     assert table.title == "The paper's claims, with vehicle.Jzz=1731"

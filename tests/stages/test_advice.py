@@ -15,17 +15,17 @@ from koopcli.simulation.samples.greedy import GreedySample
 from koopcli.simulation.samples.grid import GridSample
 from koopcli.stages.advice import Case, advise
 
-BEST_EDMD = load_experiment("best-edmd", {}).fit_edmd.settled()
+BEST_EDMD = load_experiment("best-edmd", {}).fit_edmd
 BEST_EIGEN = load_experiment("best-eigen", {})
 SURFACE = EllipsoidSample(m=1.0, Jzz=1.0)
 FORCES = Case("forces", FitEdmd(), GridSample(), trained=True, tested=True)
-SLIPS = Case("slips", FitEigen().settled(), SURFACE, trained=False, tested=False)
+SLIPS = Case("slips", FitEigen(), SURFACE, trained=False, tested=False)
 WHEELS = Case("wheels", FitEdmd.of(basis="total", order=1), DriveSample(r_w=0.3), trained=True, tested=True)
 CONSTANT_B, NEAREST = "a constant B limits it", "leave the middle of the volume empty"
 
 
 def changed(case, **fit):
-    return replace(case, fit=replace(case.fit, **fit))
+    return replace(case, fit=case.fit.but(**fit))
 
 
 @pytest.mark.parametrize(
@@ -54,15 +54,15 @@ def test_what_does_better(case, why, experiment, changes):
     ("case", "page"),
     [
         (replace(FORCES, fit=BEST_EDMD), "docs/paper.md"),
-        (replace(FORCES, fit=replace(BEST_EDMD, order=6), sample=GridSample(count=7)), "docs/paper.md"),
+        (replace(FORCES, fit=BEST_EDMD.but(order=6), sample=GridSample(count=7)), "docs/paper.md"),
         (replace(FORCES, fit=FitEdmd.of(order=10), sample=GridSample(draw="even"), tested=False), "docs/paper.md"),
         (replace(FORCES, sample=GridSample(count=10), tested=False), "docs/paper.md"),  # too few values for order 10
         (
-            replace(SLIPS, fit=BEST_EIGEN.fit_eigen.settled(), sample=BEST_EIGEN.sample("greedy")),
+            replace(SLIPS, fit=BEST_EIGEN.fit_eigen, sample=BEST_EIGEN.sample("greedy")),
             "docs/beyond.md",
         ),
         (changed(WHEELS, terms="bilinear"), "docs/wheels.md"),
-        (replace(WHEELS, fit=FitEigen().settled(), tested=False), "docs/wheels.md"),
+        (replace(WHEELS, fit=FitEigen(), tested=False), "docs/wheels.md"),
     ],
 )
 def test_where_nothing_is_known_to_do_better_a_page_says_more(case, page):

@@ -16,7 +16,7 @@ import numpy as np
 from koopcli.checks import build
 from koopcli.config.pictures import Cone, Plot, Series, Subject, Tyres
 from koopcli.config.settings import Baseline, Evaluate, Simulate, Sweep, SweepAxis
-from koopcli.config.shipped import fingerprint, used_by
+from koopcli.config.shipped import fingerprint
 from koopcli.figures.kit.registry import FIGURES
 from koopcli.koopman.bases.orthonormal import OrthonormalPolynomials
 from koopcli.koopman.bases.polynomial import Polynomial
@@ -50,9 +50,9 @@ from koopcli.simulation.samples.point import PointSample
 from koopcli.stages.base import Context
 from koopcli.stages.registry import STAGES
 from koopcli.vehicles.parameters import MagicFormula, VehicleParameters
-from koopcli.vehicles.plants.forces import ForceInput
-from koopcli.vehicles.plants.slips import SlipInput
-from koopcli.vehicles.plants.wheels import TorqueInput
+from koopcli.vehicles.plants.forces import ForceInput, Forces
+from koopcli.vehicles.plants.slips import SlipInput, Slips
+from koopcli.vehicles.plants.wheels import TorqueInput, Wheels
 
 PINS = Path(__file__).parents[1] / "golden" / "stages.json"
 BEYOND = 1e12  # a condition number past this is rounding
@@ -232,7 +232,7 @@ def figure_settings(name: str) -> Plot:
             "figure": name,
             "format": "png",
             "drawn_by": "",
-            "of": Subject((fingerprint(CAR, used_by("slips")),), ("EDMD, order 1",)),
+            "of": Subject((fingerprint(CAR, Slips.uses()),), ("EDMD, order 1",)),
             "series": tuple(Series(label, i + 3 if kind.draws == "points" else None) for i, label in enumerate(labels)),
             **{field: told[field] for field in kind.told},
         },
@@ -299,20 +299,21 @@ TOYS = {
                 vehicle=CAR,
                 dt=0.01,
                 v_eps=0.1,
+                combined="none",
             ),
             {},
         ),
     ],
     "simulate": [
-        (Simulate(vehicle=CAR, plant="forces", steps=3).settled(), {"sample": _sample()}),
-        (Simulate(vehicle=CAR, plant="forces", steps=2, force_per="wheel", dt=0.02).settled(), {"sample": _sample()}),
-        (Simulate(vehicle=CAR, plant="slips", steps=40).settled(), {"sample": _slid()}),
-        (Simulate(vehicle=ON_WHEELS, plant="wheels", steps=20).settled(), {"sample": _driven()}),
+        (Simulate(vehicle=CAR).settled(Forces(), 3), {"sample": _sample()}),
+        (Simulate(vehicle=CAR, dt=0.02).settled(Forces("wheel"), 2), {"sample": _sample()}),
+        (Simulate(vehicle=CAR).settled(Slips(), 40), {"sample": _slid()}),
+        (Simulate(vehicle=ON_WHEELS).settled(Wheels(), 20), {"sample": _driven()}),
         (
-            Simulate(vehicle=ON_WHEELS, plant="wheels", steps=3, combined="none", v_eps=0.3).settled(),
+            Simulate(vehicle=ON_WHEELS).settled(Wheels(0.3, "none"), 3),
             {"sample": _driven()},
         ),
-        (Simulate(vehicle=ON_WHEELS, plant="wheels", steps=3, reference=True).settled(), {"sample": _driven()}),
+        (Simulate(vehicle=ON_WHEELS, reference=True).settled(Wheels(), 3), {"sample": _driven()}),
     ],
     "fit-edmd": [
         (FitEdmd.of(order=2), {"trajectories": _trajectories(1)}),
@@ -336,7 +337,7 @@ TOYS = {
             {"trajectories": _gliding()},
         ),
         (
-            FitEigen(
+            FitEigen.of(
                 eigenvalues="comb",
                 pairs=1,
                 cut=1e-8,
@@ -353,7 +354,7 @@ TOYS = {
             {"trajectories": _swinging()},
         ),
         (
-            FitEigen(
+            FitEigen.of(
                 eigenvalues="varpro",
                 pairs=1,
                 cut=1e-6,

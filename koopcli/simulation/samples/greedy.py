@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -56,10 +56,6 @@ class GreedySample(SampleChoice):
     def count(self) -> int:  # type: ignore[override]
         """How many trajectories the budget pays for."""
         return int(self.budget / (self.steps * self.dt) + 1e-9)
-
-    def settled(self) -> GreedySample:
-        """The same sample: what the plant does not use of the vehicle is reset."""
-        return replace(self, vehicle=self.meant_for.used(self.vehicle))
 
     @property
     def seconds(self) -> float:

@@ -12,9 +12,11 @@ from matplotlib.textpath import TextPath
 
 from koopcli.config.experiment import vehicle_named
 from koopcli.config.pictures import Subject
-from koopcli.config.shipped import called, fingerprint, used_by
+from koopcli.config.shipped import called, fingerprint
 from koopcli.figures.kit import style
 from koopcli.figures.kit.signature import LONGEST, signature
+from koopcli.vehicles.plants import PLANTS
+from koopcli.vehicles.plants.slips import Slips
 
 CTU = vehicle_named("ctu-2020")
 
@@ -24,18 +26,18 @@ CTU = vehicle_named("ctu-2020")
 )
 def test_a_vehicle_is_called_after_every_shipped_one_that_has_its_parameters(plant, name):
     """Two shipped vehicles differ in their tyres alone, which the plant of forces knows nothing of."""
-    assert called(fingerprint(CTU, used_by(plant))) == name
+    assert called(fingerprint(CTU, PLANTS[plant].uses())) == name
 
 
 def test_any_other_vehicle_is_told_by_its_parameters():
-    one, other = (called(fingerprint(replace(CTU, Jzz=Jzz), used_by("slips"))) for Jzz in (1400.5, 1400.6))
+    one, other = (called(fingerprint(replace(CTU, Jzz=Jzz), Slips.uses())) for Jzz in (1400.5, 1400.6))
     assert one.startswith("own vehicle ")
     assert one != other
-    assert called(fingerprint(replace(CTU, r_w=0.4), used_by("slips"))) == "ctu-2020"  # which that plant has no use for
+    assert called(fingerprint(replace(CTU, r_w=0.4), Slips.uses())) == "ctu-2020"  # which that plant has no use for
 
 
 def subject(vehicles=(), predictors=()):
-    return Subject(tuple(fingerprint(vehicle_named(name), used_by("slips")) for name in vehicles), tuple(predictors))
+    return Subject(tuple(fingerprint(vehicle_named(name), Slips.uses()) for name in vehicles), tuple(predictors))
 
 
 @pytest.mark.parametrize(
