@@ -225,9 +225,9 @@ def _write_report(
     call: Invocation, name: str, parts: Sequence[Part], shown: Shown | str, identity: str | None = None
 ) -> Path:
     from koopcli import __version__
+    from koopcli.reproduction.layout import full_table
     from koopcli.reproduction.opening import opening
     from koopcli.reproduction.page import Section, page
-    from koopcli.reproduction.report import full_table
     from koopcli.store.files import publish, storage_errors
 
     root = call.pipeline.store.root

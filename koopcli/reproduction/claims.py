@@ -6,17 +6,21 @@ import math
 import shlex
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
-from koopcli.config.sampled import INPUTS
+from koopcli.config.sampled import INPUTS, Excitation
+from koopcli.config.settings import FitEdmd
 from koopcli.records import Meta
 from koopcli.reproduction import edmd_cells as blocks
+from koopcli.reproduction.edmd_cells import Training
 from koopcli.reproduction.report import Run, Table, number_text
 
 CLEAR = 1.02  # a ratio of two mean errors from which one is called larger
 WORSE = 1.05  # the same, from the best order to the largest basis
 YAW_EXACT = {"even": 1e-9, "chebyshev": 1e-9, "random": 1e-6}  # rad/s: what rounding leaves, by training draw
+FORCED: tuple[Excitation, ...] = ("none", "fresh")  # inputs that training forces of one size are judged by
 YAW_ORDERS = {"even": 10, "chebyshev": 10, "random": 7}
 
 
@@ -69,29 +73,26 @@ def claims_table(run: Run) -> Table:
     return Table(title, ["claim", "paper", "here", "verdict", "command"], rows, words=True)
 
 
-def scores(run: Run, block: str, **wanted: object) -> list[tuple[blocks.Cell, Meta]]:
-    """The cells of a block with what is ``wanted`` of their fields, and their figures."""
-    return [
-        (scored.cell, scored.figures)
-        for scored in run.scored
-        if scored.cell.block == block and all(getattr(scored.cell, name) == value for name, value in wanted.items())
-    ]
-
-
 def mean(figures: Meta) -> float:
     """The mean error in percent; infinite where predictions diverged, which leaves them out of it."""
-    found = float(figures["rmse"]["mean"])
-    return math.inf if figures["diverged"] or math.isnan(found) else found
+    value = float(figures["rmse"]["mean"])
+    return math.inf if figures["diverged"] or math.isnan(value) else value
 
 
-def by_order(run: Run, draw: str, excitation: str, block: str = blocks.SWEEP) -> dict[int, float]:
-    """The mean error of every order on a training draw."""
-    found = scores(run, block, draw=draw, excitation=excitation)
-    return {cell.order: mean(figures) for cell, figures in found if cell.order is not None}
+def _figures(run: Run, training: Training, fit: FitEdmd, kind: Excitation | None = None) -> Meta:
+    """The numbers of a fit of a training grid, under the inputs that claims are judged by unless others are said."""
+    kind = kind or blocks.excitation(run.experiment)
+    return run.figures(blocks.evaluated(run.experiment, training, fit, kind))
 
 
-def _draws(run: Run) -> list[str]:
-    return [training.name for training in blocks.trainings(run.experiment)]
+def by_order(run: Run, training: Training, kind: Excitation | None = None) -> dict[int, float]:
+    """The mean error of every order on a training grid."""
+    fits = {order: blocks.polynomials(run.experiment, order) for order in run.experiment.reproduce.orders}
+    return {order: mean(_figures(run, training, fit, kind)) for order, fit in fits.items()}
+
+
+def _smallest(means: Mapping[int, float]) -> int:
+    return min(means, key=lambda order: means[order])
 
 
 def _percent(value: float) -> str:
@@ -100,61 +101,50 @@ def _percent(value: float) -> str:
 
 def _floor(run: Run) -> Finding:
     """The best linear predictor, and the bilinear ones, on the first training draw."""
-    draw, said = _draws(run)[0], list[str]()
+    experiment, training, said = run.experiment, blocks.trainings(run.experiment)[0], list[str]()
     best: dict[str, float] = {}
-    for excitation in run.experiment.reproduce.excitations:
-        linear = by_order(run, draw, excitation)
-        order = min(linear, key=lambda one: linear[one])
-        text = f"{INPUTS[excitation]}: {_percent(linear[order])} (order {order})"
-        for terms in ("bilinear", "generator"):
-            label = blocks.outlook_name(run.experiment, blocks.bilinear(run.experiment, terms))
-            ((_, figures),) = scores(run, blocks.OTHERS, label=label, draw=draw, excitation=excitation)
-            text += f", {terms} {_percent(mean(figures))}"
-            best[excitation] = min(mean(figures), best.get(excitation, math.inf))
-            functions = figures["functions"]
+    for kind in experiment.reproduce.excitations:
+        linear = by_order(run, training, kind)
+        order = _smallest(linear)
+        text = f"{INPUTS[kind]}: {_percent(linear[order])} (order {order})"
+        for fit in blocks.bilinears(experiment):
+            figures = _figures(run, training, fit, kind)
+            text += f", {fit.terms} {_percent(mean(figures))}"
+            best[kind] = min(mean(figures), best.get(kind, math.inf))
         said.append(text)
     worst = max(best.values())
     if not worst < BEST_RMSE:
         return Finding(said, "holds")
-    ratio = f"{BEST_RMSE / worst:.0f} times better with {functions} functions"
+    ratio = f"{BEST_RMSE / worst:.0f} times better with {figures['functions']} functions"
     return Finding(said, f"does not hold: bilinear terms are {ratio}, where a constant B has a floor")
 
 
-def _splines(run: Run) -> Finding | None:
+def _splines(run: Run) -> Finding:
     """Polynomials of the paper's best order beside splines, wherever both were fitted."""
-    excitation, order = blocks.excitation(run.experiment), blocks.best_order(run.experiment)
-    said, holds = [], []
-    for cell, figures in scores(run, blocks.OTHERS, order=None, excitation=excitation):
-        polynomial, spline = by_order(run, cell.draw, excitation)[order], mean(figures)
-        said.append(f"{cell.draw}: {_percent(polynomial)} (order {order}), splines {_percent(spline)}")
+    experiment, order, said, holds = run.experiment, blocks.best_order(run.experiment), [], []
+    fits = (blocks.polynomials(experiment), blocks.splines(experiment))
+    for training in blocks.compared_on(experiment):
+        polynomial, spline = (mean(_figures(run, training, fit)) for fit in fits)
+        said.append(f"{training.name}: {_percent(polynomial)} (order {order}), splines {_percent(spline)}")
         holds.append(polynomial < spline)
-    if not said:
-        return None
     return Finding(said, _verdict(holds))
 
 
 def _best(run: Run) -> Finding | None:
     """The order of the smallest mean on every training draw, and over many where they were tried."""
-    excitation = blocks.excitation(run.experiment)
     if not set(BEST_ORDERS) & set(run.experiment.reproduce.orders):
         return None
-    found = {draw: by_order(run, draw, excitation) for draw in _draws(run)}
-    best = {draw: min(means, key=lambda order: means[order]) for draw, means in found.items()}
-    here = [f"{draw}: {order} ({_percent(found[draw][order])})" for draw, order in best.items()]
-    near = [
-        draw
-        for draw, means in found.items()
-        if min((means[o] for o in BEST_ORDERS if o in means), default=math.inf) <= CLEAR * means[best[draw]]
-    ]
-    verdict = _verdict([order in BEST_ORDERS for order in best.values()])
-    verdict += f"; within 2 % of the best in {len(near)} of {len(best)}"
-    many = [cell.draw for cell, _ in scores(run, blocks.DRAWS)]
-    if many:
-        counts = Counter(
-            min(means, key=lambda order: means[order])
-            for means in (by_order(run, draw, excitation, blocks.DRAWS) for draw in dict.fromkeys(many))
-        )
-        total = sum(counts.values())
+    here, near, holds = [], [], []
+    for training in blocks.trainings(run.experiment):
+        means = by_order(run, training)
+        order = _smallest(means)
+        here.append(f"{training.name}: {order} ({_percent(means[order])})")
+        near.append(min((means[o] for o in BEST_ORDERS if o in means), default=math.inf) <= CLEAR * means[order])
+        holds.append(order in BEST_ORDERS)
+    verdict = f"{_verdict(holds)}; within 2 % of the best in {sum(near)} of {len(near)}"
+    counts = Counter(_smallest(by_order(run, training)) for training in blocks.more_trainings(run.experiment))
+    if counts:
+        total = counts.total()
         here.append(f"over {total} random draws: {', '.join(f'{one} in {counts[one]}' for one in sorted(counts))}")
         verdict += f"; 6 to 8 in {sum(counts[order] for order in (6, 7, 8))} of {total}"
     return Finding(here, verdict)
@@ -162,20 +152,19 @@ def _best(run: Run) -> Finding | None:
 
 def _larger(run: Run) -> Finding | None:
     """The largest basis over the best, and the textbook's regression beside it."""
-    excitation = blocks.excitation(run.experiment)
     if max(run.experiment.reproduce.orders) <= BEST_ORDERS[-1]:
         return None
-    said, worse = [], []
-    for draw in _draws(run):
-        means = by_order(run, draw, excitation)
+    everywhere, said, worse = blocks.trainings(run.experiment), [], []
+    for training in everywhere:
+        means = by_order(run, training)
         best, last = min(means.values()), max(means)
-        said.append(f"{draw}: {_percent(means[last])} (order {last}), best {_percent(best)}")
+        said.append(f"{training.name}: {_percent(means[last])} (order {last}), best {_percent(best)}")
         worse.append(means[last] > WORSE * best)
-    text = _verdict(worse)
-    textbook = by_order(run, _draws(run)[0], excitation, blocks.TEXTBOOK)
+    text, first = _verdict(worse), everywhere[0]
+    textbook = {order: mean(_figures(run, first, fit)) for order, fit in blocks.textbook(run.experiment).items()}
     if textbook:
-        listed = ", ".join(f"{_percent(value)} (order {order})" for order, value in sorted(textbook.items()))
-        said.append(f"by normal equations of monomials, {_draws(run)[0]}: {listed}")
+        listed = ", ".join(f"{_percent(value)} (order {order})" for order, value in textbook.items())
+        said.append(f"by normal equations of monomials, {first.name}: {listed}")
         if max(textbook.values()) > WORSE * min(textbook.values()):
             text += ", by extrapolation" if any(worse) else ""
             text += "; with the textbook's normal equations it does, by rounding"
@@ -183,35 +172,34 @@ def _larger(run: Run) -> Finding | None:
 
 
 def _forces(run: Run) -> Finding | None:
-    """The best order trained with forces of one size."""
-    kinds = [kind for kind in ("none", "fresh") if kind in run.experiment.reproduce.excitations]
-    order, said, holds = blocks.best_order(run.experiment), [], []
-    for kind in kinds:
-        both = scores(run, blocks.FORCES, excitation=kind, order=order)
-        rows = [(cell, figures) for cell, figures in both if "bilinear" not in cell.label]
-        if len(rows) < 2:
-            continue
-        means = [mean(figures) for _, figures in rows]
-        sizes = [cell.label.rpartition(", ")[2] for cell, _ in rows]
-        listed = ", ".join(f"{size} {_percent(value)}" for size, value in zip(sizes, means, strict=True))
-        said.append(f"{INPUTS[kind]}: {listed}")
+    """The best order trained with forces of one size, by which linear predictors are judged."""
+    plan, first, best = (
+        run.experiment.reproduce,
+        blocks.trainings(run.experiment)[0],
+        blocks.polynomials(run.experiment),
+    )
+    if len(plan.training_forces) < 2 or best.terms != "linear":
+        return None
+    said, holds = [], []
+    for kind in [kind for kind in FORCED if kind in plan.excitations]:
+        means = [mean(_figures(run, replace(first, force=force), best, kind)) for force in plan.training_forces]
+        both = zip(plan.training_forces, means, strict=True)
+        said.append(f"{INPUTS[kind]}: {', '.join(f'±{force:g} N {_percent(value)}' for force, value in both)}")
         holds.append(means[-1] > CLEAR * means[0])
     return Finding(said, _verdict(holds)) if said else None
 
 
 def _yaw(run: Run) -> Finding | None:
     """The largest yaw-rate error up to the order to which rounding is harmless, of each kind of draw."""
-    said, holds = [], []
+    plan, said, holds = run.experiment.reproduce, [], []
     for training in blocks.trainings(run.experiment):
-        found = [
-            (cell.order, figures["max_error"]["yaw_rate"])
-            for cell, figures in scores(run, blocks.SWEEP, draw=training.name)
-            if cell.order is not None and cell.order <= YAW_ORDERS[training.draw]
-        ]
-        if not found:
+        orders = [order for order in plan.orders if order <= YAW_ORDERS[training.draw]]
+        if not orders:
             continue
-        error = max(value for _, value in found)
-        said.append(f"{training.name}: {error:.1e} rad/s up to order {max(order for order, _ in found)}")
+        fits = [blocks.polynomials(run.experiment, order) for order in orders]
+        scores = [_figures(run, training, fit, kind) for fit, kind in product(fits, plan.excitations)]
+        error = max(figures["max_error"]["yaw_rate"] for figures in scores)
+        said.append(f"{training.name}: {error:.1e} rad/s up to order {max(orders)}")
         holds.append(error <= YAW_EXACT[training.draw])
     return Finding(said, _verdict(holds, "holds, to rounding")) if said else None
 

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import product
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
-from koopcli.config.sampled import INPUTS
+from koopcli.config.sampled import INPUTS, Excitation
 from koopcli.config.samples import BoxSample, GridSample
 from koopcli.records import Meta
 from koopcli.reproduction import edmd_cells as blocks
 from koopcli.reproduction import headlines
-from koopcli.reproduction.claims import claims_table, scores
-from koopcli.reproduction.edmd_cells import cells
+from koopcli.reproduction.claims import claims_table
+from koopcli.reproduction.edmd_cells import Training
+from koopcli.reproduction.layout import crossed
 from koopcli.reproduction.report import (
     REDUCED,
     Method,
@@ -25,8 +27,18 @@ from koopcli.reproduction.report import (
     has_effect,
     score_text,
 )
-from koopcli.stages import grid
+from koopcli.stages import grid, verdict
+from koopcli.stages.base import Task
 
+BESIDE = (
+    blocks.OTHERS,
+    blocks.BASELINES,
+    blocks.FORCES,
+    blocks.PER_WHEEL,
+    blocks.TEST_GRID,
+    blocks.TEXTBOOK,
+    blocks.DRAWN,
+)
 NOTES = (
     "The paper does not state the test inputs behind its {paper} %, so three kinds are scored: none, ±{amplitude} N "
     "redrawn at each step (fresh), and ±{amplitude} N held over the trajectory.",
@@ -47,67 +59,72 @@ NOTES = (
 
 def pictures(experiment: Experiment) -> list[Picture]:
     """The vehicle, errors against order, and one predictor in detail: the draw, order and inputs the paper states."""
-    plan, excitation = experiment.reproduce, blocks.excitation(experiment)
-    everywhere = blocks.trainings(experiment)
-    every = list(cells(experiment))
-    sweep = [(cell, task) for cell, task in every if cell.block == blocks.SWEEP]
-    first = everywhere[0].name
-    chosen = {c: t for c, t in sweep if (c.draw, c.excitation) == (first, excitation)}
+    plan, main, first = experiment.reproduce, blocks.excitation(experiment), blocks.trainings(experiment)[0]
+    everywhere, draw = blocks.trainings(experiment), drawer(experiment)
+    kinds = {training.draw: training for training in reversed(everywhere)}.values()
+    by_order = blocks.sweep(experiment, first, main)
     orders = [order for order in plan.orders if order <= BEST_ORDERS[-1]] or list(plan.orders)
-    one = next(task for cell, task in chosen.items() if cell.order == orders[-1])
-    some = [task for cell, task in chosen.items() if cell.order in orders and cell.order % 2 == orders[-1] % 2]
-    kinds = {training.draw: training.name for training in reversed(everywhere)}.values()
-    draw = drawer(experiment)
-    data = f"{first} draw, {INPUTS[excitation]}"
+    best = by_order[orders[-1]]
+    data = f"{first.name} draw, {INPUTS[main]}"
     about = f"order {orders[-1]}, {data}"
-    restart = experiment.plot.restart
-    found = [
+    pictured = [
         Picture(draw("single-track", []), "The single-track vehicle; signs are those of ISO 8855."),
         Picture(
-            draw("orders", list(chosen.values())),
+            draw("orders", list(by_order.values())),
             f"Error against the order of the basis ({data}). The paper's two best points are marked; it does "
             "not state the test inputs.",
         ),
         Picture(
-            draw("orders", [task for cell, task in sweep if cell.draw in kinds]),
+            draw("orders", _swept(experiment, [one for one in everywhere if one in kinds], plan.excitations)),
             "Mean errors for every kind of test inputs: inputs, not the basis, set the floor.",
             leads=True,
         ),
         Picture(
-            draw("orders", [task for cell, task in sweep if cell.excitation == excitation]),
-            f"Mean errors for every training draw ({INPUTS[excitation]}).",
+            draw("orders", _swept(experiment, everywhere, [main])),
+            f"Mean errors for every training draw ({INPUTS[main]}).",
         ),
-        *(
-            [
-                Picture(
-                    draw("sweep", [grid.order_grid(experiment, excitation=excitation)]),
-                    f"Error against the order over all random training draws ({INPUTS[excitation]}).",
-                )
-            ]
-            if "random" in plan.draws
-            else []
-        ),
+    ]
+    if "random" in plan.draws:
+        about_draws = f"Error against the order over all random training draws ({INPUTS[main]})."
+        pictured.append(Picture(draw("sweep", [grid.order_grid(experiment, excitation=main)]), about_draws))
+    pictured += [
         Picture(
-            draw("horizon", blocks.compared(experiment)),
+            draw("horizon", _compared(experiment, first, main)),
             f"Median error against time of what breaks the floor, beside the linear predictor ({data}).",
         ),
         Picture(
-            draw("random-input", [one.input("predictor")]),
-            f"One trajectory under random inputs, predicted by order {orders[-1]} and started afresh every {restart} "
-            "samples. The paper finds the yaw rate tracked without error.",
+            draw("random-input", [best.input("predictor")]),
+            f"One trajectory under random inputs, predicted by order {orders[-1]} and started afresh every "
+            f"{experiment.plot.restart} samples. The paper finds the yaw rate tracked without error.",
         ),
-        Picture(draw("rmse-histogram", [one]), f"How the errors are distributed ({about})."),
-        Picture(draw("horizon", some), f"Median error against time, by order ({data})."),
-        Picture(draw("density", [one]), f"Error against the distance of the initial state to the data ({about})."),
+        Picture(draw("rmse-histogram", [best]), f"How the errors are distributed ({about})."),
         Picture(
-            draw("spectrum", [one.input("predictor")]),
+            draw("horizon", [by_order[order] for order in orders if order % 2 == orders[-1] % 2]),
+            f"Median error against time, by order ({data}).",
+        ),
+        Picture(draw("density", [best]), f"Error against the distance of the initial state to the data ({about})."),
+        Picture(
+            draw("spectrum", [best.input("predictor")]),
             f"Eigenvalues of the lifted system, order {orders[-1]}.",
         ),
     ]
-    many = [task for cell, task in every if cell.block == blocks.DRAWS]
+    many = _swept(experiment, blocks.more_trainings(experiment), [main])
     if many:
-        found.append(Picture(draw("best-order", many), f"The best order over random draws ({INPUTS[excitation]})."))
-    return found
+        pictured.append(Picture(draw("best-order", many), f"The best order over random draws ({INPUTS[main]})."))
+    return pictured
+
+
+def _swept(experiment: Experiment, trainings: Sequence[Training], kinds: Sequence[Excitation]) -> list[Task]:
+    """The sweep over orders on several training grids, under several kinds of test inputs."""
+    sweeps = [[blocks.sweep(experiment, training, kind) for kind in kinds] for training in trainings]
+    return [by_order[order] for some in sweeps for order in experiment.reproduce.orders for by_order in some]
+
+
+def _compared(experiment: Experiment, training: Training, kind: Excitation) -> list[Task]:
+    """The best order, what is set beside it, and the linearised plant."""
+    fits = (blocks.polynomials(experiment), blocks.splines(experiment), *blocks.bilinears(experiment))
+    tasks = [blocks.evaluated(experiment, training, fit, kind) for fit in fits]
+    return [*tasks, verdict.beside(experiment, tasks[0])["linearisation"]]
 
 
 def notes(runs: Sequence[Run]) -> list[str]:
@@ -126,65 +143,60 @@ def tables(runs: Sequence[Run]) -> list[Table]:
 
 def paper_table(runs: Sequence[Run]) -> Table:
     """The paper's numbers beside each run's."""
-    plan = runs[0].experiment.reproduce
-    draw = blocks.trainings(runs[0].experiment)[0].name
+    plan, training = runs[0].experiment.reproduce, blocks.trainings(runs[0].experiment)[0]
+    samples, tests = _samples(GridSample()), _tests(BoxSample())
     rows = [
         [
             "training samples, 4·15^4 in the paper",
-            _samples(GridSample()),
+            samples,
             *(_samples(blocks.grid(run.experiment)) for run in runs),
             "",
         ],
-        ["test trajectories × steps", _tests(BoxSample()), *(_tests(blocks.box(run.experiment)) for run in runs), ""],
+        ["test trajectories × steps", tests, *(_tests(blocks.box(run.experiment)) for run in runs), ""],
     ]
-    for excitation in plan.excitations:
-        for order in BEST_ORDERS:
-            if order in plan.orders:
-                label = f"RMSE, order {order}, {INPUTS[excitation]}"
-                found = [score_text(figures(run, draw, order, excitation)) for run in runs]
-                rows.append([label, f"{BEST_RMSE}", *found, "%"])
-    title = f"EDMD: paper versus here ({draw} draw), RMSE as mean ± std (median)"
+    for kind, order in product(plan.excitations, BEST_ORDERS):
+        if order in plan.orders:
+            scores = [score_text(_swept_figures(run, training, order, kind)) for run in runs]
+            rows.append([f"RMSE, order {order}, {INPUTS[kind]}", f"{BEST_RMSE}", *scores, "%"])
+    title = f"EDMD: paper versus here ({training.name} draw), RMSE as mean ± std (median)"
     return Table(title, ["", "paper", *(run.label for run in runs), "unit"], rows)
 
 
 def beside_table(runs: Sequence[Run]) -> Table:
     """Other bases, bilinear terms, baselines, and assumptions that the paper leaves open."""
-    plan, rows = runs[0].experiment.reproduce, []
-    shown = (s.cell for s in runs[0].scored if s.cell.block not in (blocks.SWEEP, blocks.DRAWS))
-    for block, label, draw, order in dict.fromkeys((c.block, c.label, c.draw, c.order) for c in shown):
-        for i, run in enumerate(runs):
-            found = {cell.excitation: score for cell, score in scores(run, block, label=label, draw=draw, order=order)}
-            special = f"{label}, order {order}" if block == blocks.TEXTBOOK else label
-            functions = next((score["functions"] for score in found.values()), 0)
-            counted = f"{special} ({functions})" if functions else special
-            name = [block, counted] if i == 0 else ["", f"  {run.label}"]
-            rows.append([*name, draw, *(score_text(found.get(e)) for e in plan.excitations)])
-    header = ["", "predictor (N)", "training draw", *(INPUTS[e] for e in plan.excitations)]
+    kinds, rows = runs[0].experiment.reproduce.excitations, []
+    lines = [crossed(run, ("block", "label", "draw", "order"), "excitation", *BESIDE) for run in runs]
+    for key, here in lines[0].items():
+        block, label, draw, order = key
+        special = f"{label}, order {order}" if block == blocks.TEXTBOOK else label
+        functions = next(iter(here.values())).figures["functions"]
+        names = [block, f"{special} ({functions})" if functions else special]
+        for run, line in zip(runs, lines, strict=True):
+            scores = {kind: scored.figures for kind, scored in line.get(key, {}).items()}
+            named = names if run is runs[0] else ["", f"  {run.label}"]
+            rows.append([*named, draw, *(score_text(scores.get(kind)) for kind in kinds)])
+    header = ["", "predictor (N)", "training draw", *(INPUTS[kind] for kind in kinds)]
     title = "Beside the polynomials: RMSE in %, mean ± std (median), with N functions"
     return Table(title, header, rows, left=3)
 
 
 def order_tables(runs: Sequence[Run]) -> list[Table]:
     """For each draw, a row for each order: mean ± std (median) in percent for each kind of test inputs."""
-    plan = runs[0].experiment.reproduce
-    found = []
+    plan, tables = runs[0].experiment.reproduce, []
     for training in blocks.trainings(runs[0].experiment):
         rows = []
-        for order in plan.orders:
-            for i, run in enumerate(runs):
-                there = [figures(run, training.name, order, excitation) for excitation in plan.excitations]
-                functions = next((str(score["functions"]) for score in there if score is not None), "–")
-                name = f"{order} ({functions})" if i == 0 else f"  {run.label}"
-                rows.append([name, *map(score_text, there)])
+        for order, run in product(plan.orders, runs):
+            scores = [_swept_figures(run, training, order, kind) for kind in plan.excitations]
+            name = f"{order} ({scores[0]['functions']})" if run is runs[0] else f"  {run.label}"
+            rows.append([name, *map(score_text, scores)])
         title = f"RMSE in %, mean ± std (median), with N functions, {training.name} draw"
-        found.append(Table(title, ["order (N)", *(INPUTS[e] for e in plan.excitations)], rows))
-    return found
+        tables.append(Table(title, ["order (N)", *(INPUTS[kind] for kind in plan.excitations)], rows))
+    return tables
 
 
-def figures(run: Run, draw: str, order: int, excitation: str) -> Meta | None:
-    """The numbers of a cell of the sweep, if the run has it."""
-    found = scores(run, blocks.SWEEP, draw=draw, order=order, excitation=excitation)
-    return found[0][1] if found else None
+def _swept_figures(run: Run, training: Training, order: int, kind: Excitation) -> Meta:
+    fit = blocks.polynomials(run.experiment, order)
+    return run.figures(blocks.evaluated(run.experiment, training, fit, kind))
 
 
 def _samples(sample: GridSample) -> str:
@@ -198,7 +210,7 @@ def _tests(test: BoxSample) -> str:
 METHOD = Method(
     name="edmd",
     title="EDMD",
-    cells=cells,
+    cells=blocks.cells,
     tables=tables,
     notes=notes,
     pictures=pictures,

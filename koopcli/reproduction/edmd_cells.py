@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from koopcli.config.experiment import Experiment
@@ -45,25 +45,144 @@ class Cell:
 
 @dataclass(frozen=True)
 class Training:
-    """A training grid by its draw, and what it is called."""
+    """A training grid by its draw; ``force``: all its inputs are of this size in N, and as many."""
 
     draw: Draw
     seed: int
+    force: float | None = None
 
     @property
     def name(self) -> str:
         """Its draw, with the seed where there is one to tell."""
         return f"{self.draw} {self.seed}" if self.draw == "random" else self.draw
 
+    def of(self, own: GridSample) -> GridSample:
+        """The sample, where the experiment's ``own`` has everything else."""
+        sample = replace(own, draw=self.draw, seed=self.seed)
+        if self.force is None:
+            return sample
+        return replace(sample, levels=(self.force,), columns=len(own.levels) * own.columns)
+
+
+def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
+    """Every cell of the experiment with its evaluation."""
+    if "order" not in OF_BASIS[experiment.fit_edmd.basis]:
+        raise InvalidValueError(
+            f"reproduce edmd sweeps orders, which the basis '{experiment.fit_edmd.basis}' has none of: leave it out"
+        )
+    for training in trainings(experiment):
+        for order in experiment.reproduce.orders:
+            yield from _row(experiment, SWEEP, "", training, polynomials(experiment, order))
+    yield from _others(experiment)
+    yield from _settings(experiment)
+    for training in more_trainings(experiment):
+        for order in experiment.reproduce.orders:
+            main = (excitation(experiment),)
+            yield from _row(experiment, DRAWS, "", training, polynomials(experiment, order), main)
+
+
+def _others(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
+    """Splines, bilinear terms and baselines, and the best order trained with forces of one size, beside one bilinear
+    row, whose regression needs them no smaller.
+    """
+    first = trainings(experiment)[0]
+    for training in compared_on(experiment):
+        for fit in (splines(experiment), *bilinears(experiment)):
+            yield from _row(experiment, OTHERS, name(experiment, fit), training, fit)
+    for kind in experiment.reproduce.excitations:
+        own = evaluated(experiment, first, experiment.fit_edmd, kind)
+        for beside, task in verdict.beside(experiment, own).items():
+            yield Cell(BASELINES, verdict.NAMES[beside], first.name, None, kind), task
+    for force in experiment.reproduce.training_forces:
+        for fit in (polynomials(experiment), bilinear(experiment, "bilinear")):
+            label = f"{name(experiment, fit)}, ±{force:g} N"
+            yield from _row(experiment, FORCES, label, replace(first, force=force), fit)
+
+
+def _settings(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
+    """Assumptions the paper leaves open, and how the textbook's regression fares."""
+    first, best, main = trainings(experiment)[0], polynomials(experiment), excitation(experiment)
+    other: ForcePer = "axle" if experiment.simulate.force_per == "wheel" else "wheel"
+    elsewhere = replace(experiment, simulate=replace(experiment.simulate, force_per=other))
+    yield from _row(elsewhere, PER_WHEEL, f"force per {other}", first, best)
+    side = round(box(experiment).count ** (1 / 3))
+    label = f"{side}³ test states on a grid"
+    yield from _row(experiment, TEST_GRID, label, first, best, layout="product", count=side**3)
+    for fit in textbook(experiment).values():
+        yield from _row(experiment, TEXTBOOK, "cholesky-monomials", first, fit, (main,))
+    restarting = replace(experiment, evaluate=replace(experiment.evaluate, restart=RESTART))
+    for fit in (best, *bilinears(experiment)):
+        predictor = trained(experiment, first, fit)
+        label = f"{outlook(predictor).name}, restart every {RESTART}"
+        yield (
+            Cell(DRAWN, label, first.name, outlook(predictor).order, "fresh"),
+            recipes.evaluation(restarting, predictor),
+        )
+
+
+def _row(
+    experiment: Experiment,
+    block: str,
+    label: str,
+    training: Training,
+    fit: FitEdmd,
+    excitations: Sequence[Excitation] = (),
+    **tested: object,
+) -> Iterator[tuple[Cell, Task]]:
+    """One fit under each kind of test inputs."""
+    predictor = trained(experiment, training, fit)
+    order = outlook(predictor).order
+    for kind in excitations or experiment.reproduce.excitations:
+        yield Cell(block, label, training.name, order, kind), _tested(experiment, predictor, kind, **tested)
+
+
+def evaluated(experiment: Experiment, training: Training, fit: FitEdmd, kind: Excitation) -> Task:
+    """The evaluation of a fit of a training grid under one kind of test inputs."""
+    return _tested(experiment, trained(experiment, training, fit), kind)
+
+
+def sweep(experiment: Experiment, training: Training, kind: Excitation) -> dict[int, Task]:
+    """The evaluation of every order on a training grid under one kind of test inputs."""
+    orders = experiment.reproduce.orders
+    return {order: evaluated(experiment, training, polynomials(experiment, order), kind) for order in orders}
+
+
+def trained(experiment: Experiment, training: Training, fit: FitEdmd) -> Task:
+    """The predictor of a fit of a training grid."""
+    sample = recipes.sample(training.of(grid(experiment)))
+    return fitted(experiment, fit, recipes.simulation(experiment, sample))
+
+
+def fitted(experiment: Experiment, fit: FitEdmd, *trajectories: Task) -> Task:
+    """The predictor of a fit, of the experiment's training set or of the trajectories given."""
+    return recipes.fit_edmd(replace(experiment, fit_edmd=fit), *trajectories)
+
+
+def _tested(experiment: Experiment, predictor: Task, kind: Excitation, **changed: object) -> Task:
+    plant = predictor.ancestor("simulate").settings
+    return recipes.evaluation(experiment, predictor, recipes.test_set(experiment, plant, excitation=kind, **changed))
+
 
 def trainings(experiment: Experiment) -> list[Training]:
     """Every training grid of the sweep: each random one, and one of each other kind."""
     plan = experiment.reproduce
-    found = []
-    for draw in plan.draws:
-        seeds = plan.draw_seeds if draw == "random" else plan.draw_seeds[:1]
-        found += [Training(draw, seed) for seed in seeds]
-    return found
+    return [
+        Training(draw, seed)
+        for draw in plan.draws
+        for seed in (plan.draw_seeds if draw == "random" else plan.draw_seeds[:1])
+    ]
+
+
+def compared_on(experiment: Experiment) -> list[Training]:
+    """The training grids that other bases are fitted to as well: a random one and another, by default."""
+    everywhere = trainings(experiment)
+    return list(dict.fromkeys((everywhere[0], everywhere[-1])))
+
+
+def more_trainings(experiment: Experiment) -> list[Training]:
+    """The many random training grids of a full run."""
+    plan = experiment.reproduce
+    return [Training("random", seed) for seed in range(plan.full_draws)] if plan.full else []
 
 
 def excitation(experiment: Experiment) -> Excitation:
@@ -78,25 +197,9 @@ def best_order(experiment: Experiment) -> int:
     return max((order for order in orders if order <= BEST_ORDERS[-1]), default=orders[0])
 
 
-def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
-    """Every cell of the experiment with its evaluation."""
-    plan = experiment.reproduce
-    if "order" not in OF_BASIS[experiment.fit_edmd.basis]:
-        raise InvalidValueError(
-            f"reproduce edmd sweeps orders, which the basis '{experiment.fit_edmd.basis}' has none of: leave it out"
-        )
-    for training in trainings(experiment):
-        for order in plan.orders:
-            yield from _scored(experiment, SWEEP, "", training, recipes.with_order(experiment, order).fit_edmd)
-    yield from _others(experiment)
-    yield from _forces(experiment)
-    yield from _settings(experiment)
-    if plan.full:
-        draws = [Training("random", seed) for seed in range(plan.full_draws)]
-        for training in draws:
-            for order in plan.orders:
-                fit = recipes.with_order(experiment, order).fit_edmd
-                yield from _scored(experiment, DRAWS, "", training, fit, (excitation(experiment),))
+def polynomials(experiment: Experiment, order: int | None = None) -> FitEdmd:
+    """The experiment's fit with an order, without one with that which stands for polynomial bases."""
+    return recipes.with_order(experiment, best_order(experiment) if order is None else order).fit_edmd
 
 
 def bilinear(experiment: Experiment, terms: Terms) -> FitEdmd:
@@ -105,121 +208,39 @@ def bilinear(experiment: Experiment, terms: Terms) -> FitEdmd:
     return FitEdmd(basis="anisotropic", order=order, terms=terms)
 
 
+def bilinears(experiment: Experiment) -> tuple[FitEdmd, FitEdmd]:
+    """Bilinear terms by a step, and by their generator."""
+    return bilinear(experiment, "bilinear"), bilinear(experiment, "generator")
+
+
 def splines(experiment: Experiment) -> FitEdmd:
     """Thin-plate splines, with the experiment's centres."""
     given = experiment.fit_edmd
     return FitEdmd(basis=SPLINES, centres=given.centres, placement=given.placement, seed=given.seed)
 
 
-def compared(experiment: Experiment) -> list[Task]:
-    """Evaluations on one test set: the best order, what is set beside it, and the linearised plant."""
-    first = trainings(experiment)[0]
-    data = training_set(experiment, first)
-    fits = [
-        recipes.with_order(experiment, best_order(experiment)).fit_edmd,
-        splines(experiment),
-        bilinear(experiment, "bilinear"),
-        bilinear(experiment, "generator"),
-    ]
-    predictors = [recipes.fit_edmd(replace(experiment, fit_edmd=fit), data) for fit in fits]
-    tasks = [_evaluated(experiment, predictor, excitation(experiment)) for predictor in predictors]
-    return [*tasks, verdict.beside(experiment, tasks[0])["linearisation"]]
+def textbook(experiment: Experiment) -> dict[int, FitEdmd]:
+    """The textbook's regression, of those of its orders that are swept."""
+    orders = (order for order in TEXTBOOK_ORDERS if order in experiment.reproduce.orders)
+    return {order: FitEdmd(order=order, solver="cholesky-monomials") for order in orders}
 
 
-def _others(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
-    """Splines, bilinear terms and baselines, on a random and on another training grid."""
-    everywhere = trainings(experiment)
-    for training in dict.fromkeys((everywhere[0], everywhere[-1])):
-        for fit in (splines(experiment), bilinear(experiment, "bilinear"), bilinear(experiment, "generator")):
-            yield from _scored(experiment, OTHERS, None, training, fit)
-    first = everywhere[0]
-    for cell, task in _scored(experiment, SWEEP, "", first, experiment.fit_edmd):
-        for name, other in verdict.beside(experiment, task).items():
-            yield Cell(BASELINES, verdict.NAMES[name], first.name, None, cell.excitation), other
-
-
-def _forces(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
-    """The best order trained with forces of one size, and one bilinear row, whose regression needs them no smaller."""
-    first, sample = trainings(experiment)[0], grid(experiment)
-    columns = len(sample.levels) * sample.columns
-    best = recipes.with_order(experiment, best_order(experiment)).fit_edmd
-    for level in experiment.reproduce.training_forces:
-        for fit in (best, bilinear(experiment, "bilinear")):
-            label = f"{outlook_name(experiment, fit)}, ±{level:g} N"
-            yield from _scored(experiment, FORCES, label, first, fit, levels=(level,), columns=columns)
-
-
-def _settings(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
-    """Assumptions the paper leaves open, and how the textbook's regression fares."""
-    first = trainings(experiment)[0]
-    best = recipes.with_order(experiment, best_order(experiment)).fit_edmd
-    other: ForcePer = "axle" if experiment.simulate.force_per == "wheel" else "wheel"
-    elsewhere = replace(experiment, simulate=replace(experiment.simulate, force_per=other))
-    yield from _scored(elsewhere, PER_WHEEL, f"force per {other}", first, best)
-    data = training_set(experiment, first)
-    predictor = recipes.fit_edmd(replace(experiment, fit_edmd=best), data)
-    side = round(box(experiment).count ** (1 / 3))
-    for kind in experiment.reproduce.excitations:
-        task = _evaluated(experiment, predictor, kind, layout="product", count=side**3)
-        yield Cell(TEST_GRID, f"{side}³ test states on a grid", first.name, best.order, kind), task
-    for order in (order for order in TEXTBOOK_ORDERS if order in experiment.reproduce.orders):
-        fit = replace(FitEdmd(order=order), solver="cholesky-monomials")
-        yield from _scored(experiment, TEXTBOOK, "cholesky-monomials", first, fit, (excitation(experiment),))
-    restarting = replace(experiment, evaluate=replace(experiment.evaluate, restart=RESTART))
-    for fit in (best, bilinear(experiment, "bilinear"), bilinear(experiment, "generator")):
-        predictor = recipes.fit_edmd(replace(experiment, fit_edmd=fit), data)
-        task = recipes.evaluation(restarting, predictor)
-        label = f"{outlook(predictor).name}, restart every {RESTART}"
-        yield Cell(DRAWN, label, first.name, _order(fit), "fresh"), task
-
-
-def outlook_name(experiment: Experiment, fit: FitEdmd) -> str:
+def name(experiment: Experiment, fit: FitEdmd) -> str:
     """What the predictor of a fit is called."""
-    return outlook(recipes.fit_edmd(replace(experiment, fit_edmd=fit))).name
-
-
-def _scored(
-    experiment: Experiment,
-    block: str,
-    label: str | None,
-    training: Training,
-    fit: FitEdmd,
-    excitations: tuple[Excitation, ...] = (),
-    **changed: object,
-) -> Iterator[tuple[Cell, Task]]:
-    """One fit under each kind of test inputs; its own name is the label where there is none."""
-    predictor = recipes.fit_edmd(replace(experiment, fit_edmd=fit), training_set(experiment, training, **changed))
-    named = outlook(predictor).name if label is None else label
-    for kind in excitations or experiment.reproduce.excitations:
-        yield Cell(block, named, training.name, _order(fit), kind), _evaluated(experiment, predictor, kind)
-
-
-def _order(fit: FitEdmd) -> int | None:
-    return None if fit.basis == SPLINES else fit.order
-
-
-def training_set(experiment: Experiment, training: Training, **changed: object) -> Task:
-    """The trajectories of a training grid, with settings of its sample ``changed``."""
-    sample = replace(grid(experiment), draw=training.draw, seed=training.seed, **changed)  # type: ignore[arg-type]
-    return recipes.simulation(experiment, recipes.sample(sample))
-
-
-def _evaluated(experiment: Experiment, predictor: Task, kind: Excitation, **changed: object) -> Task:
-    plant = predictor.ancestor("simulate").settings
-    return recipes.evaluation(experiment, predictor, recipes.test_set(experiment, plant, excitation=kind, **changed))
+    return outlook(fitted(experiment, fit)).name
 
 
 def grid(experiment: Experiment) -> GridSample:
     """The training sample. Raises ``InvalidValueError`` for another kind."""
-    found = experiment.sample("grid")
-    if not isinstance(found, GridSample):
+    sample = experiment.sample("grid")
+    if not isinstance(sample, GridSample):
         raise InvalidValueError("reproduce edmd trains on a grid: sample.kind must be 'grid'")
-    return found
+    return sample
 
 
 def box(experiment: Experiment) -> BoxSample:
     """The test states. Raises ``InvalidValueError`` for another kind."""
-    found = experiment.test("box", experiment.vehicle)
-    if not isinstance(found, BoxSample):
+    sample = experiment.test("box", experiment.vehicle)
+    if not isinstance(sample, BoxSample):
         raise InvalidValueError("reproduce edmd tests on states in a box: test.kind must be 'box'")
-    return found
+    return sample

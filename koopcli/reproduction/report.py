@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from koopcli.config.experiment import Experiment
@@ -37,9 +38,10 @@ class Table:
 
 @dataclass(frozen=True)
 class Scored:
-    """A cell of a method with the numbers of its evaluation and the record that holds them."""
+    """A cell of a method and its ``task``, with the numbers of that evaluation and the record that holds them."""
 
     cell: Any
+    task: Task
     figures: Meta
     record: Record
     measured: Mapping[str, float] = field(default_factory=dict)
@@ -58,6 +60,18 @@ class Run:
     scored: tuple[Scored, ...]
     base: str = "paper"
     changes: tuple[str, ...] = ()
+
+    def figures(self, task: Task) -> Meta:
+        """The numbers of an evaluation of a whole run."""
+        return self._figures[task]
+
+    def known(self, task: Task) -> Meta | None:
+        """The numbers of an evaluation, None where a run that stopped has none."""
+        return self._figures.get(task)
+
+    @cached_property
+    def _figures(self) -> dict[Task, Meta]:
+        return {scored.task: scored.figures for scored in self.scored}
 
 
 @dataclass(frozen=True)
@@ -155,14 +169,14 @@ def run_cells(plan: Plan, pipeline: Pipeline) -> Run:
             progress(i, len(plan.cells))
             artefact = pipeline.make(task)
             measured = method.measure(pipeline, cell, task) if method.measure is not None else {}
-            scored.append(Scored(cell, artefact.figures, artefact.record, measured))
+            scored.append(Scored(cell, task, artefact.figures, artefact.record, measured))
     return replace(plan.run, scored=tuple(scored))
 
 
 def cells_there(plan: Plan, pipeline: Pipeline) -> Run:
     """The run of a plan with the scores that the store has; nothing is made or measured."""
-    found = ((cell, pipeline.there(task)) for cell, task in plan.cells)
-    scored = (Scored(cell, artefact.figures, artefact.record) for cell, artefact in found if artefact is not None)
+    kept = ((cell, task, pipeline.there(task)) for cell, task in plan.cells)
+    scored = (Scored(cell, task, one.figures, one.record) for cell, task, one in kept if one is not None)
     return replace(plan.run, scored=tuple(scored))
 
 
@@ -175,27 +189,6 @@ def has_effect(name: str, *, plant: str, swept: Sequence[str], foreign: Sequence
     if section == "reproduce":
         return key in swept
     return not any(f"{name}.".startswith(f"{other}.") for other in (*UNUSED[plant], *foreign))
-
-
-def full_table(method: Method, runs: Sequence[Run]) -> Table:
-    """Every number of every cell."""
-    cells = [scored.cell for run in runs for scored in run.scored]
-    about = list(vars(cells[0])) if cells else []
-    header = ["run", *about, "mean", "std", "median", "max", "start", "re-lifted", "as printed"]
-    header += ["max yaw error (rad/s)", "worst in emptiest", "diverged", "artefact"]
-    rows = []
-    for run in runs:
-        for scored in run.scored:
-            figures = scored.figures
-            numbers = [statistic_text(figures, name) for name in ("mean", "std", "median", "max")]
-            others = [figures[name]["mean"] for name in ("start_error", "rmse_relift", "rmse_printed")]
-            others += [figures["max_error"]["yaw_rate"], figures["worst_in_emptiest"]]
-            cell = ["" if value is None else str(value) for value in vars(scored.cell).values()]
-            rows.append(
-                [run.label, *cell, *numbers, *map(number_text, others), str(figures["diverged"]), scored.record.name]
-            )
-    title = f"Every evaluation of {method.title}, RMSE in %"
-    return Table(title, header, rows, left=1 + len(about))
 
 
 def number_text(value: float, digits: int = 3) -> str:
