@@ -13,8 +13,7 @@ from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
 from koopcli.config.sampled import INPUTS, Excitation
 from koopcli.config.settings import FitEdmd
 from koopcli.records import Meta
-from koopcli.reproduction import edmd_cells as blocks
-from koopcli.reproduction.edmd_cells import Training
+from koopcli.reproduction.edmd_cells import SPLINES, TEXTBOOK_ORDERS, Edmd, Training
 from koopcli.reproduction.report import Run, Table, number_text
 
 CLEAR = 1.02  # a ratio of two mean errors from which one is called larger
@@ -79,16 +78,12 @@ def mean(figures: Meta) -> float:
     return math.inf if figures["diverged"] or math.isnan(value) else value
 
 
-def _figures(run: Run, training: Training, fit: FitEdmd, kind: Excitation | None = None) -> Meta:
-    """The numbers of a fit of a training grid, under the inputs that claims are judged by unless others are said."""
-    kind = kind or blocks.excitation(run.experiment)
-    return run.figures(blocks.evaluated(run.experiment, training, fit, kind))
-
-
-def by_order(run: Run, training: Training, kind: Excitation | None = None) -> dict[int, float]:
-    """The mean error of every order on a training grid."""
-    fits = {order: blocks.polynomials(run.experiment, order) for order in run.experiment.reproduce.orders}
-    return {order: mean(_figures(run, training, fit, kind)) for order, fit in fits.items()}
+def means(
+    run: Run, training: Training, fits: Mapping[int, FitEdmd], kind: Excitation | None = None
+) -> dict[int, float]:
+    """The mean errors of fits of several orders, under the inputs that claims are judged by unless others are said."""
+    tasks = {order: Edmd(run.experiment).evaluated(training, fit, kind) for order, fit in fits.items()}
+    return {order: mean(run.figures(task)) for order, task in tasks.items()}
 
 
 def _smallest(means: Mapping[int, float]) -> int:
@@ -101,14 +96,14 @@ def _percent(value: float) -> str:
 
 def _floor(run: Run) -> Finding:
     """The best linear predictor, and the bilinear ones, on the first training draw."""
-    experiment, training, said = run.experiment, blocks.trainings(run.experiment)[0], list[str]()
+    edmd, said = Edmd(run.experiment), list[str]()
     best: dict[str, float] = {}
-    for kind in experiment.reproduce.excitations:
-        linear = by_order(run, training, kind)
+    for kind in run.experiment.reproduce.excitations:
+        linear = means(run, edmd.first, edmd.polynomials, kind)
         order = _smallest(linear)
         text = f"{INPUTS[kind]}: {_percent(linear[order])} (order {order})"
-        for fit in blocks.bilinears(experiment):
-            figures = _figures(run, training, fit, kind)
+        for fit in (edmd.bilinear, edmd.generator):
+            figures = run.figures(edmd.evaluated(edmd.first, fit, kind))
             text += f", {fit.terms} {_percent(mean(figures))}"
             best[kind] = min(mean(figures), best.get(kind, math.inf))
         said.append(text)
@@ -121,28 +116,28 @@ def _floor(run: Run) -> Finding:
 
 def _splines(run: Run) -> Finding:
     """Polynomials of the paper's best order beside splines, wherever both were fitted."""
-    experiment, order, said, holds = run.experiment, blocks.best_order(run.experiment), [], []
-    fits = (blocks.polynomials(experiment), blocks.splines(experiment))
-    for training in blocks.compared_on(experiment):
-        polynomial, spline = (mean(_figures(run, training, fit)) for fit in fits)
-        said.append(f"{training.name}: {_percent(polynomial)} (order {order}), splines {_percent(spline)}")
+    edmd, said, holds = Edmd(run.experiment), [], []
+    for training in edmd.both:
+        polynomial, spline = (mean(run.figures(edmd.evaluated(training, fit))) for fit in (edmd.best, edmd.splines))
+        said.append(f"{training.name}: {_percent(polynomial)} (order {edmd.order}), splines {_percent(spline)}")
         holds.append(polynomial < spline)
     return Finding(said, _verdict(holds))
 
 
 def _best(run: Run) -> Finding | None:
     """The order of the smallest mean on every training draw, and over many where they were tried."""
-    if not set(BEST_ORDERS) & set(run.experiment.reproduce.orders):
+    edmd = Edmd(run.experiment)
+    if not set(BEST_ORDERS) & set(edmd.polynomials):
         return None
     here, near, holds = [], [], []
-    for training in blocks.trainings(run.experiment):
-        means = by_order(run, training)
-        order = _smallest(means)
-        here.append(f"{training.name}: {order} ({_percent(means[order])})")
-        near.append(min((means[o] for o in BEST_ORDERS if o in means), default=math.inf) <= CLEAR * means[order])
+    for training in edmd.trainings:
+        errors = means(run, training, edmd.polynomials)
+        order = _smallest(errors)
+        here.append(f"{training.name}: {order} ({_percent(errors[order])})")
+        near.append(min((errors[o] for o in BEST_ORDERS if o in errors), default=math.inf) <= CLEAR * errors[order])
         holds.append(order in BEST_ORDERS)
     verdict = f"{_verdict(holds)}; within 2 % of the best in {sum(near)} of {len(near)}"
-    counts = Counter(_smallest(by_order(run, training)) for training in blocks.more_trainings(run.experiment))
+    counts = Counter(_smallest(means(run, training, edmd.polynomials)) for training in edmd.many)
     if counts:
         total = counts.total()
         here.append(f"over {total} random draws: {', '.join(f'{one} in {counts[one]}' for one in sorted(counts))}")
@@ -152,19 +147,19 @@ def _best(run: Run) -> Finding | None:
 
 def _larger(run: Run) -> Finding | None:
     """The largest basis over the best, and the textbook's regression beside it."""
-    if max(run.experiment.reproduce.orders) <= BEST_ORDERS[-1]:
+    edmd = Edmd(run.experiment)
+    if max(edmd.polynomials) <= BEST_ORDERS[-1]:
         return None
-    everywhere, said, worse = blocks.trainings(run.experiment), [], []
-    for training in everywhere:
-        means = by_order(run, training)
-        best, last = min(means.values()), max(means)
-        said.append(f"{training.name}: {_percent(means[last])} (order {last}), best {_percent(best)}")
-        worse.append(means[last] > WORSE * best)
-    text, first = _verdict(worse), everywhere[0]
-    textbook = {order: mean(_figures(run, first, fit)) for order, fit in blocks.textbook(run.experiment).items()}
+    said, worse = [], []
+    for training in edmd.trainings:
+        errors = means(run, training, edmd.polynomials)
+        best, last = min(errors.values()), max(errors)
+        said.append(f"{training.name}: {_percent(errors[last])} (order {last}), best {_percent(best)}")
+        worse.append(errors[last] > WORSE * best)
+    text, textbook = _verdict(worse), means(run, edmd.first, edmd.textbook)
     if textbook:
         listed = ", ".join(f"{_percent(value)} (order {order})" for order, value in textbook.items())
-        said.append(f"by normal equations of monomials, {first.name}: {listed}")
+        said.append(f"by normal equations of monomials, {edmd.first.name}: {listed}")
         if max(textbook.values()) > WORSE * min(textbook.values()):
             text += ", by extrapolation" if any(worse) else ""
             text += "; with the textbook's normal equations it does, by rounding"
@@ -173,33 +168,29 @@ def _larger(run: Run) -> Finding | None:
 
 def _forces(run: Run) -> Finding | None:
     """The best order trained with forces of one size, by which linear predictors are judged."""
-    plan, first, best = (
-        run.experiment.reproduce,
-        blocks.trainings(run.experiment)[0],
-        blocks.polynomials(run.experiment),
-    )
-    if len(plan.training_forces) < 2 or best.terms != "linear":
+    edmd, plan = Edmd(run.experiment), run.experiment.reproduce
+    if len(plan.training_forces) < 2 or edmd.best.terms != "linear":
         return None
     said, holds = [], []
     for kind in [kind for kind in FORCED if kind in plan.excitations]:
-        means = [mean(_figures(run, replace(first, force=force), best, kind)) for force in plan.training_forces]
-        both = zip(plan.training_forces, means, strict=True)
-        said.append(f"{INPUTS[kind]}: {', '.join(f'±{force:g} N {_percent(value)}' for force, value in both)}")
-        holds.append(means[-1] > CLEAR * means[0])
+        trainings = {force: replace(edmd.first, force=force) for force in plan.training_forces}
+        errors = {f: mean(run.figures(edmd.evaluated(each, edmd.best, kind))) for f, each in trainings.items()}
+        said.append(f"{INPUTS[kind]}: {', '.join(f'±{f:g} N {_percent(value)}' for f, value in errors.items())}")
+        smallest, *_, largest = errors.values()
+        holds.append(largest > CLEAR * smallest)
     return Finding(said, _verdict(holds)) if said else None
 
 
 def _yaw(run: Run) -> Finding | None:
     """The largest yaw-rate error up to the order to which rounding is harmless, of each kind of draw."""
-    plan, said, holds = run.experiment.reproduce, [], []
-    for training in blocks.trainings(run.experiment):
-        orders = [order for order in plan.orders if order <= YAW_ORDERS[training.draw]]
-        if not orders:
+    edmd, said, holds = Edmd(run.experiment), [], []
+    for training in edmd.trainings:
+        fits = {order: fit for order, fit in edmd.polynomials.items() if order <= YAW_ORDERS[training.draw]}
+        if not fits:
             continue
-        fits = [blocks.polynomials(run.experiment, order) for order in orders]
-        scores = [_figures(run, training, fit, kind) for fit, kind in product(fits, plan.excitations)]
-        error = max(figures["max_error"]["yaw_rate"] for figures in scores)
-        said.append(f"{training.name}: {error:.1e} rad/s up to order {max(orders)}")
+        both = product(fits.values(), run.experiment.reproduce.excitations)
+        error = max(run.figures(edmd.evaluated(training, *one))["max_error"]["yaw_rate"] for one in both)
+        said.append(f"{training.name}: {error:.1e} rad/s up to order {max(fits)}")
         holds.append(error <= YAW_EXACT[training.draw])
     return Finding(said, _verdict(holds, "holds, to rounding")) if said else None
 
@@ -223,18 +214,18 @@ def _evaluate(run: Run, keeps: tuple[str, ...] = (), **fit: object) -> Command:
 
 def _first_grid(run: Run) -> dict[str, object]:
     """What the first training grid differs in from the experiment's own."""
-    first, own = blocks.trainings(run.experiment)[0], blocks.grid(run.experiment)
-    sets: dict[str, object] = {} if first.draw == own.draw else {"sample.draw": first.draw}
-    return sets if first.seed == own.seed else {**sets, "sample.seed": first.seed}
+    edmd = Edmd(run.experiment)
+    names = [name for name in ("draw", "seed") if getattr(edmd.first, name) != getattr(edmd.grid, name)]
+    return {f"sample.{name}": getattr(edmd.first, name) for name in names}
 
 
 def _test(run: Run) -> dict[str, object]:
-    excitation = blocks.excitation(run.experiment)
-    return {} if excitation == blocks.box(run.experiment).excitation else {"test.excitation": excitation}
+    edmd = Edmd(run.experiment)
+    return {} if edmd.inputs == edmd.box.excitation else {"test.excitation": edmd.inputs}
 
 
 def _show_floor(run: Run) -> Command:
-    fit = blocks.bilinear(run.experiment, "generator")
+    fit = Edmd(run.experiment).generator
     return _evaluate(run, basis=fit.basis, order=fit.order, terms=fit.terms)
 
 
@@ -244,15 +235,14 @@ def _show_orders(run: Run) -> Command:
 
 
 def _show_forces(run: Run) -> Command:
-    sample, order = blocks.grid(run.experiment), blocks.best_order(run.experiment)
-    shown = _evaluate(run, SWEPT, order=order)
-    largest = f"[{run.experiment.reproduce.training_forces[-1]:g}]"
-    columns = len(sample.levels) * sample.columns
-    return Command(shown.words, {**shown.sets, "sample.levels": largest, "sample.columns": columns}, shown.keeps)
+    edmd, largest = Edmd(run.experiment), run.experiment.reproduce.training_forces[-1]
+    shown, sample = _evaluate(run, SWEPT, order=edmd.order), replace(edmd.first, force=largest).of(edmd.grid)
+    sets = {**shown.sets, "sample.levels": f"[{largest:g}]", "sample.columns": sample.columns}
+    return replace(shown, sets=sets)
 
 
 def _show_yaw(run: Run) -> Command:
-    sets = {"fit-edmd.order": blocks.best_order(run.experiment), **_first_grid(run)}
+    sets = {"fit-edmd.order": Edmd(run.experiment).order, **_first_grid(run)}
     return Command(("plot", "random-input"), sets, (*DATA, "test.point.", "plot.", *SWEPT))
 
 
@@ -262,14 +252,14 @@ CLAIMS = (
         "polynomials beat thin-plate splines",
         "said, without a figure",
         _splines,
-        lambda run: _evaluate(run, SPLINED, basis=blocks.SPLINES),
+        lambda run: _evaluate(run, SPLINED, basis=SPLINES),
     ),
     Claim("orders 6 and 7 are best", "6 and 7", _best, _show_orders),
     Claim(
         "larger bases get worse",
         "grows exponentially",
         _larger,
-        lambda run: _evaluate(run, order=blocks.TEXTBOOK_ORDERS[-1], solver="cholesky-monomials"),
+        lambda run: _evaluate(run, order=TEXTBOOK_ORDERS[-1], solver="cholesky-monomials"),
     ),
     Claim("small training forces beat large ones", "±1 to ±100 N chosen", _forces, _show_forces),
     Claim("the yaw rate is tracked without error", "without error", _yaw, _show_yaw),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from itertools import product
 
@@ -14,7 +14,7 @@ from koopcli.records import Meta
 from koopcli.reproduction import edmd_cells as blocks
 from koopcli.reproduction import headlines
 from koopcli.reproduction.claims import claims_table
-from koopcli.reproduction.edmd_cells import Training
+from koopcli.reproduction.edmd_cells import Edmd, Training
 from koopcli.reproduction.layout import crossed
 from koopcli.reproduction.report import (
     REDUCED,
@@ -59,14 +59,21 @@ NOTES = (
 
 def pictures(experiment: Experiment) -> list[Picture]:
     """The vehicle, errors against order, and one predictor in detail: the draw, order and inputs the paper states."""
-    plan, main, first = experiment.reproduce, blocks.excitation(experiment), blocks.trainings(experiment)[0]
-    everywhere, draw = blocks.trainings(experiment), drawer(experiment)
-    kinds = {training.draw: training for training in reversed(everywhere)}.values()
-    by_order = blocks.sweep(experiment, first, main)
+    edmd, plan, draw = Edmd(experiment), experiment.reproduce, drawer(experiment)
+    kinds = {training.draw: training for training in reversed(edmd.trainings)}.values()
     orders = [order for order in plan.orders if order <= BEST_ORDERS[-1]] or list(plan.orders)
-    best = by_order[orders[-1]]
-    data = f"{first.name} draw, {INPUTS[main]}"
+    by_order = {order: edmd.evaluated(edmd.first, fit) for order, fit in edmd.polynomials.items()}
+    last = by_order[orders[-1]]
+    inputs = INPUTS[edmd.inputs]
+    data = f"{edmd.first.name} draw, {inputs}"
     about = f"order {orders[-1]}, {data}"
+
+    def swept(trainings: Iterable[Training], *kinds: Excitation) -> list[Task]:
+        return [edmd.evaluated(*one) for one in product(trainings, edmd.polynomials.values(), kinds)]
+
+    fits = (edmd.best, edmd.splines, edmd.bilinear, edmd.generator)
+    compared = [edmd.evaluated(edmd.first, fit) for fit in fits]
+    linearised = verdict.beside(experiment, compared[0])["linearisation"]
     pictured = [
         Picture(draw("single-track", []), "The single-track vehicle; signs are those of ISO 8855."),
         Picture(
@@ -75,63 +82,46 @@ def pictures(experiment: Experiment) -> list[Picture]:
             "not state the test inputs.",
         ),
         Picture(
-            draw("orders", _swept(experiment, [one for one in everywhere if one in kinds], plan.excitations)),
+            draw("orders", swept([one for one in edmd.trainings if one in kinds], *plan.excitations)),
             "Mean errors for every kind of test inputs: inputs, not the basis, set the floor.",
             leads=True,
         ),
-        Picture(
-            draw("orders", _swept(experiment, everywhere, [main])),
-            f"Mean errors for every training draw ({INPUTS[main]}).",
-        ),
+        Picture(draw("orders", swept(edmd.trainings, edmd.inputs)), f"Mean errors for every training draw ({inputs})."),
     ]
     if "random" in plan.draws:
-        about_draws = f"Error against the order over all random training draws ({INPUTS[main]})."
-        pictured.append(Picture(draw("sweep", [grid.order_grid(experiment, excitation=main)]), about_draws))
+        all_draws = f"Error against the order over all random training draws ({inputs})."
+        pictured.append(Picture(draw("sweep", [grid.order_grid(experiment, excitation=edmd.inputs)]), all_draws))
     pictured += [
         Picture(
-            draw("horizon", _compared(experiment, first, main)),
+            draw("horizon", [*compared, linearised]),
             f"Median error against time of what breaks the floor, beside the linear predictor ({data}).",
         ),
         Picture(
-            draw("random-input", [best.input("predictor")]),
+            draw("random-input", [last.input("predictor")]),
             f"One trajectory under random inputs, predicted by order {orders[-1]} and started afresh every "
             f"{experiment.plot.restart} samples. The paper finds the yaw rate tracked without error.",
         ),
-        Picture(draw("rmse-histogram", [best]), f"How the errors are distributed ({about})."),
+        Picture(draw("rmse-histogram", [last]), f"How the errors are distributed ({about})."),
         Picture(
             draw("horizon", [by_order[order] for order in orders if order % 2 == orders[-1] % 2]),
             f"Median error against time, by order ({data}).",
         ),
-        Picture(draw("density", [best]), f"Error against the distance of the initial state to the data ({about})."),
-        Picture(
-            draw("spectrum", [best.input("predictor")]),
-            f"Eigenvalues of the lifted system, order {orders[-1]}.",
-        ),
+        Picture(draw("density", [last]), f"Error against the distance of the initial state to the data ({about})."),
+        Picture(draw("spectrum", [last.input("predictor")]), f"Eigenvalues of the lifted system, order {orders[-1]}."),
     ]
-    many = _swept(experiment, blocks.more_trainings(experiment), [main])
-    if many:
-        pictured.append(Picture(draw("best-order", many), f"The best order over random draws ({INPUTS[main]})."))
+    if edmd.many:
+        pictured.append(
+            Picture(draw("best-order", swept(edmd.many, edmd.inputs)), f"The best order over random draws ({inputs}).")
+        )
     return pictured
-
-
-def _swept(experiment: Experiment, trainings: Sequence[Training], kinds: Sequence[Excitation]) -> list[Task]:
-    """The sweep over orders on several training grids, under several kinds of test inputs."""
-    sweeps = [[blocks.sweep(experiment, training, kind) for kind in kinds] for training in trainings]
-    return [by_order[order] for some in sweeps for order in experiment.reproduce.orders for by_order in some]
-
-
-def _compared(experiment: Experiment, training: Training, kind: Excitation) -> list[Task]:
-    """The best order, what is set beside it, and the linearised plant."""
-    fits = (blocks.polynomials(experiment), blocks.splines(experiment), *blocks.bilinears(experiment))
-    tasks = [blocks.evaluated(experiment, training, fit, kind) for fit in fits]
-    return [*tasks, verdict.beside(experiment, tasks[0])["linearisation"]]
 
 
 def notes(runs: Sequence[Run]) -> list[str]:
     """What the tables mean, beginning with a word on runs of another size than the paper's."""
+    experiments = [Edmd(run.experiment) for run in runs]
     full = (_samples(GridSample()), _tests(BoxSample()))
-    sizes = {(_samples(blocks.grid(run.experiment)), _tests(blocks.box(run.experiment))) for run in runs}
-    amplitudes = dict.fromkeys(f"{blocks.box(run.experiment).amplitude:g}" for run in runs)
+    sizes = {(_samples(edmd.grid), _tests(edmd.box)) for edmd in experiments}
+    amplitudes = dict.fromkeys(f"{edmd.box.amplitude:g}" for edmd in experiments)
     said = [note.format(paper=BEST_RMSE, amplitude=" or ".join(amplitudes)) for note in NOTES]
     return said if sizes == {full} else [REDUCED, *said]
 
@@ -143,22 +133,22 @@ def tables(runs: Sequence[Run]) -> list[Table]:
 
 def paper_table(runs: Sequence[Run]) -> Table:
     """The paper's numbers beside each run's."""
-    plan, training = runs[0].experiment.reproduce, blocks.trainings(runs[0].experiment)[0]
-    samples, tests = _samples(GridSample()), _tests(BoxSample())
+    experiments = [Edmd(run.experiment) for run in runs]
+    plan, first = runs[0].experiment.reproduce, experiments[0].first
     rows = [
         [
             "training samples, 4·15^4 in the paper",
-            samples,
-            *(_samples(blocks.grid(run.experiment)) for run in runs),
+            _samples(GridSample()),
+            *(_samples(edmd.grid) for edmd in experiments),
             "",
         ],
-        ["test trajectories × steps", tests, *(_tests(blocks.box(run.experiment)) for run in runs), ""],
+        ["test trajectories × steps", _tests(BoxSample()), *(_tests(edmd.box) for edmd in experiments), ""],
     ]
     for kind, order in product(plan.excitations, BEST_ORDERS):
         if order in plan.orders:
-            scores = [score_text(_swept_figures(run, training, order, kind)) for run in runs]
+            scores = [score_text(_swept(run, first, order, kind)) for run in runs]
             rows.append([f"RMSE, order {order}, {INPUTS[kind]}", f"{BEST_RMSE}", *scores, "%"])
-    title = f"EDMD: paper versus here ({training.name} draw), RMSE as mean ± std (median)"
+    title = f"EDMD: paper versus here ({first.name} draw), RMSE as mean ± std (median)"
     return Table(title, ["", "paper", *(run.label for run in runs), "unit"], rows)
 
 
@@ -183,10 +173,10 @@ def beside_table(runs: Sequence[Run]) -> Table:
 def order_tables(runs: Sequence[Run]) -> list[Table]:
     """For each draw, a row for each order: mean ± std (median) in percent for each kind of test inputs."""
     plan, tables = runs[0].experiment.reproduce, []
-    for training in blocks.trainings(runs[0].experiment):
+    for training in Edmd(runs[0].experiment).trainings:
         rows = []
         for order, run in product(plan.orders, runs):
-            scores = [_swept_figures(run, training, order, kind) for kind in plan.excitations]
+            scores = [_swept(run, training, order, kind) for kind in plan.excitations]
             name = f"{order} ({scores[0]['functions']})" if run is runs[0] else f"  {run.label}"
             rows.append([name, *map(score_text, scores)])
         title = f"RMSE in %, mean ± std (median), with N functions, {training.name} draw"
@@ -194,9 +184,9 @@ def order_tables(runs: Sequence[Run]) -> list[Table]:
     return tables
 
 
-def _swept_figures(run: Run, training: Training, order: int, kind: Excitation) -> Meta:
-    fit = blocks.polynomials(run.experiment, order)
-    return run.figures(blocks.evaluated(run.experiment, training, fit, kind))
+def _swept(run: Run, training: Training, order: int, kind: Excitation) -> Meta:
+    edmd = Edmd(run.experiment)
+    return run.figures(edmd.evaluated(training, edmd.with_order(order), kind))
 
 
 def _samples(sample: GridSample) -> str:

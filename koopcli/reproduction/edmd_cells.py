@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS
 from koopcli.config.sampled import Draw, Excitation
 from koopcli.config.samples import BoxSample, GridSample
-from koopcli.config.settings import OF_BASIS, BasisName, FitEdmd, ForcePer, Terms
+from koopcli.config.settings import OF_BASIS, BasisName, FitEdmd, ForcePer
 from koopcli.errors import InvalidValueError
 from koopcli.stages import recipes, verdict
 from koopcli.stages.base import Task
@@ -64,183 +66,177 @@ class Training:
         return replace(sample, levels=(self.force,), columns=len(own.levels) * own.columns)
 
 
+@dataclass(frozen=True)
+class Edmd:
+    """What an ``experiment`` has of the method: its training grids, its fits, and the evaluations of both."""
+
+    experiment: Experiment
+
+    @cached_property
+    def trainings(self) -> list[Training]:
+        """Every training grid of the sweep: each random one, and one of each other kind."""
+        plan = self.experiment.reproduce
+        seeds = {draw: plan.draw_seeds if draw == "random" else plan.draw_seeds[:1] for draw in plan.draws}
+        return [Training(draw, seed) for draw in plan.draws for seed in seeds[draw]]
+
+    @property
+    def first(self) -> Training:
+        """The training grid of everything that is fitted on one alone."""
+        return self.trainings[0]
+
+    @property
+    def both(self) -> list[Training]:
+        """The training grids that other bases are fitted to as well: a random one and another, by default."""
+        return list(dict.fromkeys((self.trainings[0], self.trainings[-1])))
+
+    @property
+    def many(self) -> list[Training]:
+        """The many random training grids of a full run."""
+        plan = self.experiment.reproduce
+        return [Training("random", seed) for seed in range(plan.full_draws)] if plan.full else []
+
+    @property
+    def inputs(self) -> Excitation:
+        """The test inputs that claims are judged by: the kind the paper states, if it is swept."""
+        kinds = self.experiment.reproduce.excitations
+        return "fresh" if "fresh" in kinds else kinds[0]
+
+    @property
+    def order(self) -> int:
+        """The order that stands for polynomial bases: the paper's best, or the nearest below that is swept."""
+        orders = self.experiment.reproduce.orders
+        return max((order for order in orders if order <= BEST_ORDERS[-1]), default=orders[0])
+
+    @property
+    def polynomials(self) -> dict[int, FitEdmd]:
+        """The experiment's fit with every order of the sweep."""
+        return {order: self.with_order(order) for order in self.experiment.reproduce.orders}
+
+    @property
+    def best(self) -> FitEdmd:
+        """The fit that stands for polynomial bases."""
+        return self.with_order(self.order)
+
+    @property
+    def bilinear(self) -> FitEdmd:
+        """Bilinear terms on a constant and a linear velocity times powers of the yaw rate."""
+        return FitEdmd(basis="anisotropic", order=min(BILINEAR_ORDER, self.grid.count - 1), terms="bilinear")
+
+    @property
+    def generator(self) -> FitEdmd:
+        """The same in continuous time."""
+        return replace(self.bilinear, terms="generator")
+
+    @property
+    def splines(self) -> FitEdmd:
+        """Thin-plate splines, with the experiment's centres."""
+        own = self.experiment.fit_edmd
+        return FitEdmd(basis=SPLINES, centres=own.centres, placement=own.placement, seed=own.seed)
+
+    @property
+    def textbook(self) -> dict[int, FitEdmd]:
+        """The textbook's regression, of those of its orders that are swept."""
+        orders = [order for order in TEXTBOOK_ORDERS if order in self.experiment.reproduce.orders]
+        return {order: FitEdmd(order=order, solver="cholesky-monomials") for order in orders}
+
+    def with_order(self, order: int) -> FitEdmd:
+        """The experiment's fit with an order."""
+        return recipes.with_order(self.experiment, order).fit_edmd
+
+    def trained(self, training: Training, fit: FitEdmd) -> Task:
+        """The predictor of a fit on a training grid."""
+        trajectories = recipes.simulation(self.experiment, recipes.sample(training.of(self.grid)))
+        return recipes.fit_edmd(replace(self.experiment, fit_edmd=fit), trajectories)
+
+    def evaluated(self, training: Training, fit: FitEdmd, kind: Excitation | None = None, **tested: object) -> Task:
+        """Its evaluation under a kind of test inputs, those that claims are judged by if none are said; ``tested``:
+        settings of the test sample to replace.
+        """
+        predictor = self.trained(training, fit)
+        plant = predictor.ancestor("simulate").settings
+        test = recipes.test_set(self.experiment, plant, excitation=kind or self.inputs, **tested)
+        return recipes.evaluation(self.experiment, predictor, test)
+
+    @property
+    def grid(self) -> GridSample:
+        """The training sample. Raises ``InvalidValueError`` for another kind."""
+        sample = self.experiment.sample("grid")
+        if not isinstance(sample, GridSample):
+            raise InvalidValueError("reproduce edmd trains on a grid: sample.kind must be 'grid'")
+        return sample
+
+    @property
+    def box(self) -> BoxSample:
+        """The test states. Raises ``InvalidValueError`` for another kind."""
+        sample = self.experiment.test("box", self.experiment.vehicle)
+        if not isinstance(sample, BoxSample):
+            raise InvalidValueError("reproduce edmd tests on states in a box: test.kind must be 'box'")
+        return sample
+
+
 def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
     """Every cell of the experiment with its evaluation."""
     if "order" not in OF_BASIS[experiment.fit_edmd.basis]:
         raise InvalidValueError(
             f"reproduce edmd sweeps orders, which the basis '{experiment.fit_edmd.basis}' has none of: leave it out"
         )
-    for training in trainings(experiment):
-        for order in experiment.reproduce.orders:
-            yield from _row(experiment, SWEEP, "", training, polynomials(experiment, order))
-    yield from _others(experiment)
-    yield from _settings(experiment)
-    for training in more_trainings(experiment):
-        for order in experiment.reproduce.orders:
-            main = (excitation(experiment),)
-            yield from _row(experiment, DRAWS, "", training, polynomials(experiment, order), main)
+    edmd = Edmd(experiment)
+    for training, fit in product(edmd.trainings, edmd.polynomials.values()):
+        yield from _row(edmd, SWEEP, "", training, fit)
+    yield from _others(edmd)
+    yield from _settings(edmd)
+    for training, fit in product(edmd.many, edmd.polynomials.values()):
+        yield from _row(edmd, DRAWS, "", training, fit, [edmd.inputs])
 
 
-def _others(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
+def _others(edmd: Edmd) -> Iterator[tuple[Cell, Task]]:
     """Splines, bilinear terms and baselines, and the best order trained with forces of one size, beside one bilinear
     row, whose regression needs them no smaller.
     """
-    first = trainings(experiment)[0]
-    for training in compared_on(experiment):
-        for fit in (splines(experiment), *bilinears(experiment)):
-            yield from _row(experiment, OTHERS, name(experiment, fit), training, fit)
-    for kind in experiment.reproduce.excitations:
-        own = evaluated(experiment, first, experiment.fit_edmd, kind)
-        for beside, task in verdict.beside(experiment, own).items():
-            yield Cell(BASELINES, verdict.NAMES[beside], first.name, None, kind), task
-    for force in experiment.reproduce.training_forces:
-        for fit in (polynomials(experiment), bilinear(experiment, "bilinear")):
-            label = f"{name(experiment, fit)}, ±{force:g} N"
-            yield from _row(experiment, FORCES, label, replace(first, force=force), fit)
+    plan, first = edmd.experiment.reproduce, edmd.first
+    for training, fit in product(edmd.both, (edmd.splines, edmd.bilinear, edmd.generator)):
+        yield from _row(edmd, OTHERS, "{name}", training, fit)
+    for kind in plan.excitations:
+        own = edmd.evaluated(first, edmd.experiment.fit_edmd, kind)
+        for name, task in verdict.beside(edmd.experiment, own).items():
+            yield Cell(BASELINES, verdict.NAMES[name], first.name, None, kind), task
+    for force, fit in product(plan.training_forces, (edmd.best, edmd.bilinear)):
+        yield from _row(edmd, FORCES, f"{{name}}, ±{force:g} N", replace(first, force=force), fit)
 
 
-def _settings(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
+def _settings(edmd: Edmd) -> Iterator[tuple[Cell, Task]]:
     """Assumptions the paper leaves open, and how the textbook's regression fares."""
-    first, best, main = trainings(experiment)[0], polynomials(experiment), excitation(experiment)
+    experiment, first = edmd.experiment, edmd.first
     other: ForcePer = "axle" if experiment.simulate.force_per == "wheel" else "wheel"
-    elsewhere = replace(experiment, simulate=replace(experiment.simulate, force_per=other))
-    yield from _row(elsewhere, PER_WHEEL, f"force per {other}", first, best)
-    side = round(box(experiment).count ** (1 / 3))
-    label = f"{side}³ test states on a grid"
-    yield from _row(experiment, TEST_GRID, label, first, best, layout="product", count=side**3)
-    for fit in textbook(experiment).values():
-        yield from _row(experiment, TEXTBOOK, "cholesky-monomials", first, fit, (main,))
+    elsewhere = Edmd(replace(experiment, simulate=replace(experiment.simulate, force_per=other)))
+    yield from _row(elsewhere, PER_WHEEL, f"force per {other}", first, edmd.best)
+    side = round(edmd.box.count ** (1 / 3))
+    on_grid: dict[str, object] = {"layout": "product", "count": side**3}
+    yield from _row(edmd, TEST_GRID, f"{side}³ test states on a grid", first, edmd.best, **on_grid)
+    for fit in edmd.textbook.values():
+        yield from _row(edmd, TEXTBOOK, "cholesky-monomials", first, fit, [edmd.inputs])
     restarting = replace(experiment, evaluate=replace(experiment.evaluate, restart=RESTART))
-    for fit in (best, *bilinears(experiment)):
-        predictor = trained(experiment, first, fit)
-        label = f"{outlook(predictor).name}, restart every {RESTART}"
-        yield (
-            Cell(DRAWN, label, first.name, outlook(predictor).order, "fresh"),
-            recipes.evaluation(restarting, predictor),
-        )
+    for fit in (edmd.best, edmd.bilinear, edmd.generator):
+        predictor = edmd.trained(first, fit)
+        cell = _cell(DRAWN, f"{{name}}, restart every {RESTART}", first, predictor, "fresh")
+        yield cell, recipes.evaluation(restarting, predictor)
 
 
 def _row(
-    experiment: Experiment,
+    edmd: Edmd,
     block: str,
     label: str,
     training: Training,
     fit: FitEdmd,
-    excitations: Sequence[Excitation] = (),
+    kinds: Sequence[Excitation] = (),
     **tested: object,
 ) -> Iterator[tuple[Cell, Task]]:
-    """One fit under each kind of test inputs."""
-    predictor = trained(experiment, training, fit)
-    order = outlook(predictor).order
-    for kind in excitations or experiment.reproduce.excitations:
-        yield Cell(block, label, training.name, order, kind), _tested(experiment, predictor, kind, **tested)
+    """One fit under each kind of test inputs; ``{name}`` in its label is what it is called."""
+    for kind in kinds or edmd.experiment.reproduce.excitations:
+        task = edmd.evaluated(training, fit, kind, **tested)
+        yield _cell(block, label, training, task.input("predictor"), kind), task
 
 
-def evaluated(experiment: Experiment, training: Training, fit: FitEdmd, kind: Excitation) -> Task:
-    """The evaluation of a fit of a training grid under one kind of test inputs."""
-    return _tested(experiment, trained(experiment, training, fit), kind)
-
-
-def sweep(experiment: Experiment, training: Training, kind: Excitation) -> dict[int, Task]:
-    """The evaluation of every order on a training grid under one kind of test inputs."""
-    orders = experiment.reproduce.orders
-    return {order: evaluated(experiment, training, polynomials(experiment, order), kind) for order in orders}
-
-
-def trained(experiment: Experiment, training: Training, fit: FitEdmd) -> Task:
-    """The predictor of a fit of a training grid."""
-    sample = recipes.sample(training.of(grid(experiment)))
-    return fitted(experiment, fit, recipes.simulation(experiment, sample))
-
-
-def fitted(experiment: Experiment, fit: FitEdmd, *trajectories: Task) -> Task:
-    """The predictor of a fit, of the experiment's training set or of the trajectories given."""
-    return recipes.fit_edmd(replace(experiment, fit_edmd=fit), *trajectories)
-
-
-def _tested(experiment: Experiment, predictor: Task, kind: Excitation, **changed: object) -> Task:
-    plant = predictor.ancestor("simulate").settings
-    return recipes.evaluation(experiment, predictor, recipes.test_set(experiment, plant, excitation=kind, **changed))
-
-
-def trainings(experiment: Experiment) -> list[Training]:
-    """Every training grid of the sweep: each random one, and one of each other kind."""
-    plan = experiment.reproduce
-    return [
-        Training(draw, seed)
-        for draw in plan.draws
-        for seed in (plan.draw_seeds if draw == "random" else plan.draw_seeds[:1])
-    ]
-
-
-def compared_on(experiment: Experiment) -> list[Training]:
-    """The training grids that other bases are fitted to as well: a random one and another, by default."""
-    everywhere = trainings(experiment)
-    return list(dict.fromkeys((everywhere[0], everywhere[-1])))
-
-
-def more_trainings(experiment: Experiment) -> list[Training]:
-    """The many random training grids of a full run."""
-    plan = experiment.reproduce
-    return [Training("random", seed) for seed in range(plan.full_draws)] if plan.full else []
-
-
-def excitation(experiment: Experiment) -> Excitation:
-    """The test inputs that claims are judged by: the kind the paper states, if it is swept."""
-    plan = experiment.reproduce
-    return "fresh" if "fresh" in plan.excitations else plan.excitations[0]
-
-
-def best_order(experiment: Experiment) -> int:
-    """The order that stands for polynomial bases: the paper's best, or the nearest below that is swept."""
-    orders = experiment.reproduce.orders
-    return max((order for order in orders if order <= BEST_ORDERS[-1]), default=orders[0])
-
-
-def polynomials(experiment: Experiment, order: int | None = None) -> FitEdmd:
-    """The experiment's fit with an order, without one with that which stands for polynomial bases."""
-    return recipes.with_order(experiment, best_order(experiment) if order is None else order).fit_edmd
-
-
-def bilinear(experiment: Experiment, terms: Terms) -> FitEdmd:
-    """Bilinear terms on a constant and a linear velocity times powers of the yaw rate."""
-    order = min(BILINEAR_ORDER, grid(experiment).count - 1)
-    return FitEdmd(basis="anisotropic", order=order, terms=terms)
-
-
-def bilinears(experiment: Experiment) -> tuple[FitEdmd, FitEdmd]:
-    """Bilinear terms by a step, and by their generator."""
-    return bilinear(experiment, "bilinear"), bilinear(experiment, "generator")
-
-
-def splines(experiment: Experiment) -> FitEdmd:
-    """Thin-plate splines, with the experiment's centres."""
-    given = experiment.fit_edmd
-    return FitEdmd(basis=SPLINES, centres=given.centres, placement=given.placement, seed=given.seed)
-
-
-def textbook(experiment: Experiment) -> dict[int, FitEdmd]:
-    """The textbook's regression, of those of its orders that are swept."""
-    orders = (order for order in TEXTBOOK_ORDERS if order in experiment.reproduce.orders)
-    return {order: FitEdmd(order=order, solver="cholesky-monomials") for order in orders}
-
-
-def name(experiment: Experiment, fit: FitEdmd) -> str:
-    """What the predictor of a fit is called."""
-    return outlook(fitted(experiment, fit)).name
-
-
-def grid(experiment: Experiment) -> GridSample:
-    """The training sample. Raises ``InvalidValueError`` for another kind."""
-    sample = experiment.sample("grid")
-    if not isinstance(sample, GridSample):
-        raise InvalidValueError("reproduce edmd trains on a grid: sample.kind must be 'grid'")
-    return sample
-
-
-def box(experiment: Experiment) -> BoxSample:
-    """The test states. Raises ``InvalidValueError`` for another kind."""
-    sample = experiment.test("box", experiment.vehicle)
-    if not isinstance(sample, BoxSample):
-        raise InvalidValueError("reproduce edmd tests on states in a box: test.kind must be 'box'")
-    return sample
+def _cell(block: str, label: str, training: Training, predictor: Task, kind: Excitation) -> Cell:
+    about = outlook(predictor)
+    return Cell(block, label.format(name=about.name), training.name, about.order, kind)

@@ -11,7 +11,8 @@ from koopcli.config.paper import BEST_ORDERS, BEST_RMSE, EIGEN_RMSE
 from koopcli.config.sampled import INPUTS, Excitation
 from koopcli.config.samples import GreedySample
 from koopcli.records import Meta
-from koopcli.reproduction import beyond_cells, edmd_cells, eigen_cells
+from koopcli.reproduction import beyond_cells, eigen_cells
+from koopcli.reproduction.edmd_cells import Edmd
 from koopcli.reproduction.report import Lead, Number, Race, Run, count_text, mean_text, number_text
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
@@ -21,43 +22,38 @@ CANDIDATES = 2000  # states to choose from, enough for a budget as small
 PAPER_EIGEN = f"{EIGEN_RMSE[0]:g} ± {EIGEN_RMSE[1]:g}"
 
 
-def _edmd(run: Run, kind: Excitation) -> tuple[Meta | None, Meta | None]:
+def _edmd(run: Run, kind: Excitation | None = None) -> tuple[Meta | None, Meta | None]:
     """The polynomials that the paper calls best, and the bilinear generator, on the first training draw."""
-    training = edmd_cells.trainings(run.experiment)[0]
-    fits = edmd_cells.polynomials(run.experiment), edmd_cells.bilinear(run.experiment, "generator")
-    linear, bilinear = (run.known(edmd_cells.evaluated(run.experiment, training, fit, kind)) for fit in fits)
+    edmd = Edmd(run.experiment)
+    linear, bilinear = (run.known(edmd.evaluated(edmd.first, fit, kind)) for fit in (edmd.best, edmd.generator))
     return linear, bilinear
 
 
 def _edmd_numbers(runs: Sequence[Run]) -> list[Number]:
-    first = runs[0].experiment
-    order, main = edmd_cells.best_order(first), edmd_cells.excitation(first)
-    paper = f"{BEST_RMSE}" if order in BEST_ORDERS else "–"
-    both = [_edmd(run, main) for run in runs]
-    counted = next((f"{bilinear['functions']} " for _, bilinear in both if bilinear is not None), "")
-    found = [
-        Number(f"EDMD, order {order}, {INPUTS[main]}", paper, [mean_text(linear) for linear, _ in both]),
-        Number(f"{counted}bilinear functions, the same inputs", "–", [mean_text(bilinear) for _, bilinear in both]),
+    edmd = Edmd(runs[0].experiment)
+    paper = f"{BEST_RMSE}" if edmd.order in BEST_ORDERS else "–"
+    linear, bilinear = zip(*map(_edmd, runs), strict=True)
+    counted = next((f"{figures['functions']} " for figures in bilinear if figures is not None), "")
+    numbers = [
+        Number(f"EDMD, order {edmd.order}, {INPUTS[edmd.inputs]}", paper, [*map(mean_text, linear)]),
+        Number(f"{counted}bilinear functions, the same inputs", "–", [*map(mean_text, bilinear)]),
     ]
-    for kind in reversed([kind for kind in first.reproduce.excitations if kind != main]):
+    for kind in reversed([kind for kind in edmd.experiment.reproduce.excitations if kind != edmd.inputs]):
         here = [mean_text(_edmd(run, kind)[0]) for run in runs]
-        found.append(Number(f"EDMD, order {order}, {INPUTS[kind]}", paper, here))
-    return found
+        numbers.append(Number(f"EDMD, order {edmd.order}, {INPUTS[kind]}", paper, here))
+    return numbers
 
 
 def _edmd_clause(run: Run) -> str | None:
-    order = edmd_cells.best_order(run.experiment)
-    linear, bilinear = _edmd(run, edmd_cells.excitation(run.experiment))
+    order, (linear, bilinear) = Edmd(run.experiment).order, _edmd(run)
     if linear is None:
         return None
     counted = f"{count_text(linear['functions'])} polynomials (EDMD, order {order})"
     stated = f"{BEST_RMSE} % is the paper's best" if order in BEST_ORDERS else f"the paper's best is {BEST_RMSE} %"
     said = f"Under random inputs, {counted} {_misses(linear)} ({stated})"
-    return (
-        said
-        if bilinear is None
-        else f"{said}, {bilinear['functions']} bilinear functions of the same data {_misses(bilinear)}"
-    )
+    if bilinear is None:
+        return said
+    return f"{said}, {bilinear['functions']} bilinear functions of the same data {_misses(bilinear)}"
 
 
 def _misses(figures: Meta) -> str:
@@ -66,10 +62,9 @@ def _misses(figures: Meta) -> str:
 
 
 def _edmd_race(experiment: Experiment) -> Race:
-    training, order = edmd_cells.trainings(experiment)[0], edmd_cells.best_order(experiment)
-    fits = edmd_cells.polynomials(experiment), edmd_cells.bilinear(experiment, "generator")
-    linear, bilinear = (edmd_cells.trained(experiment, training, fit) for fit in fits)
-    return Race(((f"linear, order {order}", linear), ("bilinear, best-edmd", bilinear)))
+    edmd = Edmd(experiment)
+    linear, bilinear = (edmd.trained(edmd.first, fit) for fit in (edmd.best, edmd.generator))
+    return Race(((f"linear, order {edmd.order}", linear), ("bilinear, best-edmd", bilinear)))
 
 
 def _first(task: Callable[[Experiment, int], Task], experiment: Experiment) -> Task:
