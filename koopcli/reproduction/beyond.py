@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 import numpy as np
 
@@ -15,22 +14,11 @@ from koopcli.koopman.predictor.trust import LEVEL
 from koopcli.records import Meta
 from koopcli.reproduction import beyond_cells as blocks
 from koopcli.reproduction import headlines
-from koopcli.reproduction.eigen import FOREIGN
+from koopcli.reproduction.eigen import FIXED, FOREIGN
 from koopcli.reproduction.eigen_cells import ball, surface
-from koopcli.reproduction.layout import Column, by_vehicle, columns, texts
-from koopcli.reproduction.report import (
-    REDUCED,
-    Method,
-    Picture,
-    Run,
-    Scored,
-    Table,
-    count_text,
-    drawer,
-    has_effect,
-    number_text,
-    score_text,
-)
+from koopcli.reproduction.layout import Column, by_vehicle, columns, labelled, score_texts, vehicle_table
+from koopcli.reproduction.report import REDUCED, Method, Picture, Run, Scored, Table, drawer
+from koopcli.reproduction.texts import count_text, number_text, score_text
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline
@@ -65,7 +53,7 @@ def _ladder(first: Run, shown: Sequence[Column]) -> Table:
         for label, design, simulated in dict.fromkeys(key[:-1] for key in lines):
             scores = [lines[label, design, simulated, seed] for seed in seeds]
             scored = next((one for one in scores[0] if one is not None), None)
-            below = map("\n".join, zip(*map(texts, scores), strict=True))
+            below = map("\n".join, zip(*map(score_texts, scores), strict=True))
             rows.append([design, label, f"{simulated:.0f}", *_costs(scored), *below])
     queries = f"{count_text(ball(first.experiment).count)} queries (s)"
     header = ["initial states", "rates, lift", "simulated (s)", "lifted states", "build (s)", queries]
@@ -83,10 +71,8 @@ def _costs(scored: Scored | None) -> list[str]:
 
 def _ablation(shown: Sequence[Column]) -> Table:
     best = [_best(column, _seeds(column.run)[0]) for column in shown]
-    rows = [["nothing: best-eigen", *map(score_text, best)]]
-    rows += [[label, *texts(scores)] for (label,), scores in by_vehicle(shown, blocks.ABLATION, "label").items()]
-    title = "One ingredient taken away: RMSE in %, mean ± std (median)"
-    return Table(title, ["instead", *(column.heading for column in shown)], rows)
+    rows = [["nothing: best-eigen", *map(score_text, best)], *labelled(shown, blocks.ABLATION)]
+    return vehicle_table("One ingredient taken away: RMSE in %, mean ± std (median)", ["instead"], shown, rows)
 
 
 def _modes(shown: Sequence[Column]) -> Table:
@@ -94,8 +80,8 @@ def _modes(shown: Sequence[Column]) -> Table:
         [label, str(modes), *(_missed(scored) for scored in scores)]
         for (label, modes), scores in by_vehicle(shown, blocks.MODES, "label", "modes").items()
     ]
-    header = ["rates", "modes", *(column.heading for column in shown)]
-    return Table("How many modes: what the fit misses of the data / RMSE, in %", header, rows)
+    title = "How many modes: what the fit misses of the data / RMSE, in %"
+    return vehicle_table(title, ["rates", "modes"], shown, rows)
 
 
 def _missed(scored: Scored | None) -> str:
@@ -209,12 +195,9 @@ METHOD = Method(
     notes=notes,
     pictures=pictures,
     lead=headlines.BEYOND,
-    fixed={"test.seed": "reproduce.seeds=[4,5]", "test.ball.seed": "reproduce.seeds=[4,5]"},
-    uses=partial(
-        has_effect,
-        plant="slips",
-        swept=("seeds", "beside", "unseen", "pairs", "budgets"),
-        foreign=(*FOREIGN, "fit-eigen"),
-    ),
+    fixed=FIXED,
+    plant="slips",
+    swept=("seeds", "beside", "unseen", "pairs", "budgets"),
+    foreign=(*FOREIGN, "fit-eigen"),
     measure=measure,
 )

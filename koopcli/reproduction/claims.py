@@ -14,7 +14,8 @@ from koopcli.config.sampled import INPUTS, Excitation
 from koopcli.config.settings import FitEdmd
 from koopcli.records import Meta
 from koopcli.reproduction.edmd_cells import SPLINES, TEXTBOOK_ORDERS, Edmd, Training
-from koopcli.reproduction.report import Run, Table, number_text
+from koopcli.reproduction.report import Run, Table
+from koopcli.reproduction.texts import number_text
 
 CLEAR = 1.02  # a ratio of two mean errors from which one is called larger
 WORSE = 1.05  # the same, from the best order to the largest basis

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import partial
 from itertools import product
 
 from koopcli.config.experiment import Experiment
@@ -16,29 +15,11 @@ from koopcli.reproduction import headlines
 from koopcli.reproduction.claims import claims_table
 from koopcli.reproduction.edmd_cells import Edmd, Training
 from koopcli.reproduction.layout import crossed
-from koopcli.reproduction.report import (
-    REDUCED,
-    Method,
-    Picture,
-    Run,
-    Table,
-    count_text,
-    drawer,
-    has_effect,
-    score_text,
-)
+from koopcli.reproduction.report import REDUCED, Method, Picture, Run, Table, drawer
+from koopcli.reproduction.texts import count_text, score_text
 from koopcli.stages import grid, verdict
 from koopcli.stages.base import Task
 
-BESIDE = (
-    blocks.OTHERS,
-    blocks.BASELINES,
-    blocks.FORCES,
-    blocks.PER_WHEEL,
-    blocks.TEST_GRID,
-    blocks.TEXTBOOK,
-    blocks.DRAWN,
-)
 NOTES = (
     "The paper does not state the test inputs behind its {paper} %, so three kinds are scored: none, ±{amplitude} N "
     "redrawn at each step (fresh), and ±{amplitude} N held over the trajectory.",
@@ -155,7 +136,7 @@ def paper_table(runs: Sequence[Run]) -> Table:
 def beside_table(runs: Sequence[Run]) -> Table:
     """Other bases, bilinear terms, baselines, and assumptions that the paper leaves open."""
     kinds, rows = runs[0].experiment.reproduce.excitations, []
-    lines = [crossed(run, ("block", "label", "draw", "order"), "excitation", *BESIDE) for run in runs]
+    lines = [crossed(run, ("block", "label", "draw", "order"), "excitation", *blocks.BESIDE) for run in runs]
     for key, here in lines[0].items():
         block, label, draw, order = key
         special = f"{label}, order {order}" if block == blocks.TEXTBOOK else label
@@ -214,20 +195,17 @@ METHOD = Method(
         "test.excitation": 'reproduce.excitations=["held"]',
         "test.box.excitation": 'reproduce.excitations=["held"]',
     },
-    uses=partial(
-        has_effect,
-        plant="forces",
-        swept=("orders", "draws", "draw_seeds", "training_forces", "full", "full_draws", "excitations"),
-        foreign=(
-            "fit-eigen",
-            "baseline",
-            "sample.box",
-            "sample.point",
-            "sample.ellipsoid",
-            "sample.greedy",
-            "sample.ball",
-            "test.ball",
-        ),
+    plant="forces",
+    swept=("orders", "draws", "draw_seeds", "training_forces", "full", "full_draws", "excitations"),
+    foreign=(
+        "fit-eigen",
+        "baseline",
+        "sample.box",
+        "sample.point",
+        "sample.ellipsoid",
+        "sample.greedy",
+        "sample.ball",
+        "test.ball",
     ),
     reads=("fit-edmd.centres", "fit-edmd.placement", "fit-edmd.seed"),
 )

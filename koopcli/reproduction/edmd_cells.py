@@ -28,6 +28,7 @@ SWEEP, OTHERS, BASELINES, FORCES, PER_WHEEL, TEST_GRID, TEXTBOOK, DRAWN, DRAWS =
     "random inputs",
     "more draws",
 )
+BESIDE = (OTHERS, BASELINES, FORCES, PER_WHEEL, TEST_GRID, TEXTBOOK, DRAWN)  # all but sweeps
 BILINEAR_ORDER = 8  # of the yaw rate, beside degree 1 of the velocity: 27 functions
 TEXTBOOK_ORDERS = (5, 6, 7)  # where the normal equations of monomials end
 RESTART = 50  # samples, as in the paper's figure
@@ -211,8 +212,8 @@ def _settings(edmd: Edmd) -> Iterator[tuple[Cell, Task]]:
     elsewhere = Edmd(replace(experiment, simulate=replace(experiment.simulate, force_per=other)))
     yield from _row(elsewhere, PER_WHEEL, f"force per {other}", first, edmd.best)
     side = round(edmd.box.count ** (1 / 3))
-    on_grid: dict[str, object] = {"layout": "product", "count": side**3}
-    yield from _row(edmd, TEST_GRID, f"{side}³ test states on a grid", first, edmd.best, **on_grid)
+    label = f"{side}³ test states on a grid"
+    yield from _row(edmd, TEST_GRID, label, first, edmd.best, layout="product", count=side**3)
     for fit in edmd.textbook.values():
         yield from _row(edmd, TEXTBOOK, "cholesky-monomials", first, fit, [edmd.inputs])
     restarting = replace(experiment, evaluate=replace(experiment.evaluate, restart=RESTART))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 from koopcli.config.experiment import DEFAULT_VEHICLE, Experiment, vehicle_named
 from koopcli.config.paper import EIGEN_RMSE
@@ -14,21 +13,12 @@ from koopcli.records import Meta
 from koopcli.reproduction import eigen_cells as blocks
 from koopcli.reproduction import headlines
 from koopcli.reproduction.eigen_cells import ball, cut_text, surface
-from koopcli.reproduction.layout import Column, by_vehicle, columns, texts
-from koopcli.reproduction.report import (
-    REDUCED,
-    Method,
-    Picture,
-    Run,
-    Table,
-    count_text,
-    drawer,
-    has_effect,
-    number_text,
-    score_text,
-)
+from koopcli.reproduction.layout import Column, by_vehicle, columns, labelled, score_texts, vehicle_table
+from koopcli.reproduction.report import REDUCED, Method, Picture, Run, Table, drawer
+from koopcli.reproduction.texts import count_text, number_text, score_text
 from koopcli.stages import recipes
 
+SCORES = ", RMSE in %, mean ± std (median)"
 SIZES = (count_text(EllipsoidSample.count), count_text(BallSample.count, BallSample.steps))  # the paper's
 
 
@@ -82,22 +72,17 @@ def tables(runs: Sequence[Run]) -> list[Table]:
     headline = [column.run.figures(blocks.headline(column.experiment, first)) for column in everywhere]
     readings = by_vehicle(everywhere, blocks.READINGS, "label", "seed").items()
     above = ["eigenfunctions, as above", *map(score_text, headline)]
+    below = [[label if seed == first else f"  seed {seed}", *score_texts(line)] for (label, seed), line in readings]
+    baselines = f"Baselines without any fit, and EDMD of the very same trajectories{SCORES}"
+    grip = f"Sensitivity to the grip of the road{SCORES}"
     return [
         _paper_table(everywhere, headline, others),
-        _table(
-            "Other readings",
-            "reading",
-            everywhere,
-            [[label if seed == first else f"  seed {seed}", *texts(scores)] for (label, seed), scores in readings],
+        vehicle_table(f"Other readings{SCORES}", ["reading"], everywhere, below),
+        vehicle_table(
+            f"Sensitivity to the cut{SCORES}", ["boundary functions, cut"], main, labelled(main, blocks.CUTS)
         ),
-        _table("Sensitivity to the cut", "boundary functions, cut", main, _labelled(main, blocks.CUTS)),
-        _table("Sensitivity to the grip of the road", "", everywhere, [above, *_labelled(everywhere, blocks.GRIP)]),
-        _table(
-            "Baselines without any fit, and EDMD of the very same trajectories",
-            "",
-            everywhere,
-            [above, *_labelled(everywhere, blocks.BASELINES)],
-        ),
+        vehicle_table(grip, [""], everywhere, [above, *labelled(everywhere, blocks.GRIP)]),
+        vehicle_table(baselines, [""], everywhere, [above, *labelled(everywhere, blocks.BASELINES)]),
     ]
 
 
@@ -126,16 +111,6 @@ def _paper_table(shown: Sequence[Column], headline: Sequence[Meta], seeds: Seque
     ]
     header = ["", "paper", *(column.heading for column in shown), "unit"]
     return Table(f"Eigenfunctions: paper versus here ({_about(shown[0].experiment.fit_eigen)})", header, rows)
-
-
-def _table(title: str, names: str, shown: Sequence[Column], rows: list[list[str]]) -> Table:
-    header = [names, *(column.heading for column in shown)]
-    return Table(f"{title}, RMSE in %, mean ± std (median)", header, rows)
-
-
-def _labelled(shown: Sequence[Column], block: str) -> list[list[str]]:
-    """A row for each label of a block."""
-    return [[label, *texts(scores)] for (label,), scores in by_vehicle(shown, block, "label").items()]
 
 
 def notes(runs: Sequence[Run]) -> list[str]:
@@ -195,6 +170,7 @@ def _about(fit: FitEigen) -> str:
     return f"{fit.boundary}{splines}{cut_text(settled.cut)}, sums of up to {fit.degree} rates"
 
 
+FIXED = {"test.seed": "reproduce.seeds=[4,5]", "test.ball.seed": "reproduce.seeds=[4,5]"}
 FOREIGN = (
     "fit-edmd",
     "baseline",
@@ -216,14 +192,8 @@ METHOD = Method(
     notes=notes,
     pictures=pictures,
     lead=headlines.EIGEN,
-    fixed={
-        "test.seed": "reproduce.seeds=[4,5]",
-        "test.ball.seed": "reproduce.seeds=[4,5]",
-    },
-    uses=partial(
-        has_effect,
-        plant="slips",
-        swept=("seeds", "cuts", "mu_scales", "beside"),
-        foreign=FOREIGN,
-    ),
+    fixed=FIXED,
+    plant="slips",
+    swept=("seeds", "cuts", "mu_scales", "beside"),
+    foreign=FOREIGN,
 )

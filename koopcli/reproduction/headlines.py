@@ -13,7 +13,8 @@ from koopcli.config.samples import GreedySample
 from koopcli.records import Meta
 from koopcli.reproduction import beyond_cells, eigen_cells
 from koopcli.reproduction.edmd_cells import Edmd
-from koopcli.reproduction.report import Lead, Number, Race, Run, count_text, mean_text, number_text
+from koopcli.reproduction.report import Lead, Number, Race, Run
+from koopcli.reproduction.texts import count_text, mean_text, number_text
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 

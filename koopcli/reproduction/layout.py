@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from koopcli.config.experiment import Experiment
-from koopcli.reproduction.report import Method, Run, Scored, Table, number_text, score_text, statistic_text
+from koopcli.reproduction.report import Method, Run, Scored, Table
+from koopcli.reproduction.texts import number_text, score_text, statistic_text
 from koopcli.stages import recipes
 
 Vehicles = list[tuple[str, Experiment]]
@@ -51,9 +52,19 @@ def by_vehicle(shown: Sequence[Column], block: str, *rows: str) -> dict[tuple[An
     return {key: [lines[column.run.label].get(key, {}).get(column.vehicle) for column in shown] for key in keys}
 
 
-def texts(scores: Sequence[Scored | None]) -> list[str]:
+def vehicle_table(title: str, names: Sequence[str], shown: Sequence[Column], rows: list[list[str]]) -> Table:
+    """A table of rows that begin with ``names`` and go on with a text for each vehicle."""
+    return Table(title, [*names, *(column.heading for column in shown)], rows)
+
+
+def score_texts(scores: Sequence[Scored | None]) -> list[str]:
     """Scores of a row as ``mean ± std (median)``."""
     return [score_text(None if scored is None else scored.figures) for scored in scores]
+
+
+def labelled(shown: Sequence[Column], block: str) -> list[list[str]]:
+    """A row for each label of a block."""
+    return [[label, *score_texts(scores)] for (label,), scores in by_vehicle(shown, block, "label").items()]
 
 
 def full_table(method: Method, runs: Sequence[Run]) -> Table:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -20,7 +19,6 @@ from koopcli.store import Record
 REDUCED = "This run is not of the paper's size: its numbers cannot be put beside the paper's."
 RASTERS: frozenset[FigureName] = frozenset({"error-map", "error-side", "energy-surface", "density", "spectrum"})
 # figures of thousands of marks, which are smaller as PNG at the paper's size; all others are smaller as SVG
-SMALLEST, LARGEST = 5, 6  # powers of ten between which numbers are written without one
 
 
 @dataclass(frozen=True)
@@ -133,12 +131,23 @@ class Method:
     """What of it stands on the first screen."""
     fixed: Mapping[str, str]
     """Settings that the method sweeps over or fixes, and what to write instead."""
-    uses: Callable[[str], bool]
-    """Whether a setting has an effect on the method."""
+    plant: str
+    """What its vehicles are driven by."""
+    swept: Sequence[str]
+    """Its settings of `reproduce`."""
+    foreign: Sequence[str]
+    """Sections and tables that belong to other methods, or to no cell of this one."""
     measure: Callable[[Pipeline, Any, Task], Mapping[str, float]] | None = None
     """What is measured of a cell beside its evaluation."""
     reads: Sequence[str] = ()
     """Settings of fits that some of its cells have a use for, whatever the experiment's own fit has."""
+
+    def uses(self, name: str) -> bool:
+        """Whether a setting has an effect on the method."""
+        section, _, key = name.partition(".")
+        if section == "reproduce":
+            return key in self.swept
+        return not any(f"{name}.".startswith(f"{other}.") for other in (*UNUSED[self.plant], *self.foreign))
 
 
 @dataclass(frozen=True)
@@ -180,50 +189,6 @@ def cells_there(plan: Plan, pipeline: Pipeline) -> Run:
     return replace(plan.run, scored=tuple(scored))
 
 
-def has_effect(name: str, *, plant: str, swept: Sequence[str], foreign: Sequence[str]) -> bool:
-    """Whether the setting ``name`` has an effect on a method with this ``plant``.
-
-    ``swept``: its settings of `reproduce`; ``foreign``: sections and tables that belong to the other methods.
-    """
-    section, _, key = name.partition(".")
-    if section == "reproduce":
-        return key in swept
-    return not any(f"{name}.".startswith(f"{other}.") for other in (*UNUSED[plant], *foreign))
-
-
-def number_text(value: float, digits: int = 3) -> str:
-    """A number with ``digits`` significant ones, written as people write it: 3.30, 1230, 1.0e-12."""
-    if not math.isfinite(value):
-        return "–"
-    if value == 0:
-        return "0"
-    exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])
-    if not -SMALLEST <= exponent < LARGEST:
-        return f"{value:.{digits - 1}e}"
-    decimals = digits - 1 - exponent
-    return f"{round(value, decimals):.{max(0, decimals)}f}"
-
-
-def statistic_text(figures: Meta, name: str) -> str:
-    """A statistic of the RMSE: the deviation with two significant digits, any other with three."""
-    return number_text(figures["rmse"][name], 2 if name == "std" else 3)
-
-
-def mean_text(figures: Meta | None) -> str:
-    """``mean ± std`` of the RMSE, or that it diverges."""
-    if figures is None:
-        return "–"
-    if not math.isfinite(figures["rmse"]["mean"]):
-        return "diverges"
-    return f"{statistic_text(figures, 'mean')} ± {statistic_text(figures, 'std')}"
-
-
-def score_text(figures: Meta | None) -> str:
-    """``mean ± std (median)`` of the RMSE, or that it diverges."""
-    text = mean_text(figures)
-    return text if figures is None or "±" not in text else f"{text} ({statistic_text(figures, 'median')})"
-
-
 def drawer(experiment: Experiment) -> Callable[..., Task]:
     """``(figure, artefacts, labels=…)`` -> its task for the report of an experiment, in the format that is smaller."""
 
@@ -232,8 +197,3 @@ def drawer(experiment: Experiment) -> Callable[..., Task]:
         return drawn.figure(figure, artefacts, image, experiment, labels=labels)
 
     return draw
-
-
-def count_text(*numbers: int) -> str:
-    """Counts with thousands apart, joined by a times sign."""
-    return " × ".join(f"{number:,}".replace(",", " ") for number in numbers)
