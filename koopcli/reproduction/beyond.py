@@ -136,14 +136,16 @@ def pictures(experiment: Experiment) -> list[Picture]:
     draw, seed = drawer(experiment), experiment.reproduce.seeds[0]
     frontier, pictured = [], []
     for vehicle, own in recipes.vehicles(experiment):
-        ladder, budgets, edmd, modes = (
-            [blocks.evaluated(row, own, seed) for row in rows(own)]
-            for rows in (blocks.ladder, blocks.budgets, blocks.beside, blocks.sweep)
+        first, shells, best = (
+            blocks.evaluated(row(own), own, seed) for row in (blocks.first_row, blocks.shells_row, blocks.best_row)
         )
-        best = ladder[-1]
-        frontier += [ladder[0], ladder[blocks.STACKED], best, *budgets, *edmd[1:]]
+        budgets, edmd, modes = (
+            [blocks.evaluated(row, own, seed) for row in rows(own)]
+            for rows in (blocks.budgets, blocks.beside, blocks.sweep)
+        )
+        frontier += [first, shells, best, *budgets, *edmd[1:]]
         about = f"Errors by initial state, {vehicle}: the paper's surface, lattice and nearest sample, and best-eigen."
-        labels = {ladder[0]: "before", best: "after"}
+        labels = {first: "before", best: "after"}
         taken = {best: "best-eigen", **{blocks.evaluated(row, own, seed): row.label for row in blocks.ablation(own)}}
         pictured += [
             Picture(draw("before-after", list(labels), labels=labels), about),

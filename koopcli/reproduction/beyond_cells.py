@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from koopcli.config.experiment import Experiment
+from koopcli.config.sampled import Mesh
 from koopcli.config.samples import EllipsoidSample, GreedySample, SampleSettings
 from koopcli.config.settings import PAIRS, FitEdmd, FitEigen
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.eigen.rates import lattice_size
-from koopcli.reproduction.eigen_cells import CUT, surface
+from koopcli.reproduction.eigen_cells import CUT, optimal, surface
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 
@@ -19,12 +20,11 @@ SHELLS, SHELL_STEPS, SHELL_TABLE = 6, 80, 0.3  # of the design by shells; s
 TABLE, HORIZON = 0.5, 0.5  # s, of trajectories of one second
 THINNED = 20  # nodes of each trajectory, where neighbours are not chosen apart
 LADDER, BUDGETS, EDMD, ABLATION, UNSEEN, MODES = "ladder", "budgets", "edmd", "ablation", "unseen", "modes"
-BESIDE = (
-    FitEdmd(basis="total", order=7),
-    FitEdmd(basis="thin-plate", centres=300),
-    FitEdmd(basis="total", order=9),
-)  # EDMD of the same trajectories
-STACKED = 5  # which rung of the ladder has shells
+BESIDE = {
+    "EDMD, total, order 7": FitEdmd(basis="total", order=7),
+    "EDMD, thin-plate, 300 centres": FitEdmd(basis="thin-plate", centres=300),
+    "EDMD, total, order 9": FitEdmd(basis="total", order=9),
+}  # of the same trajectories
 STATES = 3  # of the plant on tyres
 
 
@@ -105,32 +105,41 @@ def best(experiment: Experiment, seed: int) -> Task:
 
 def ladder(experiment: Experiment) -> Iterator[Row]:
     """From the paper's reading to the best predictor, an ingredient at a time."""
-    gamma, shells = surface(experiment), f"{SHELLS} shells"
-    paper = FitEigen(boundary="optimal", cut=CUT, tabulate=experiment.fit_eigen.tabulate)
-    comb = replace(paper, eigenvalues="comb")
-    yield Row("lattice of rates, nearest sample", "surface", gamma, paper)
+    gamma, paper = surface(experiment), optimal(experiment, CUT)
+    comb, varpro = replace(paper, eigenvalues="comb"), replace(paper, eigenvalues="varpro")
+    yield first_row(experiment)
     yield Row("lattice of rates, linear", "surface", gamma, replace(paper, lift="linear"))
     yield Row("comb of rates, nearest sample", "surface", gamma, comb)
-    yield Row(f"{_count('varpro')} best rates, nearest sample", "surface", gamma, replace(paper, eigenvalues="varpro"))
+    yield Row(f"{2 * PAIRS['varpro'] + 2} best rates, nearest sample", "surface", gamma, varpro)
     yield Row("comb of rates, linear", "surface", gamma, replace(comb, lift="linear"))
-    stacked = replace(gamma, shells=SHELLS, steps=SHELL_STEPS)
-    ahead = replace(AHEAD, tabulate=SHELL_TABLE, lift="linear")
-    yield Row("comb, linear", f"{shells}, spiral", replace(stacked, mesh="fibonacci"), ahead)
-    yield Row("comb, linear", f"{shells}, mesh", replace(stacked, mesh="sphere"), ahead)
-    filled = greedy(experiment, plain=True)
-    linear, spline = replace(AHEAD, lift="linear"), replace(AHEAD, lift="polyharmonic", nodes=THINNED)
+    yield shells_row(experiment)
+    yield shells_row(experiment, "mesh", "sphere")
+    filled, linear = greedy(experiment, plain=True), replace(AHEAD, lift="linear")
+    splines = replace(AHEAD, lift="polyharmonic", nodes=THINNED)
     yield Row("comb, linear", "greedy", filled, linear)
-    yield Row("comb, splines", "greedy", filled, spline)
+    yield Row("comb, splines", "greedy", filled, splines)
     yield Row("comb, linear, world", "greedy", filled, replace(linear, coordinates="world"))
-    world = replace(spline, coordinates="world")
+    world = replace(splines, coordinates="world")
     yield Row("comb, splines, world", "greedy", filled, world)
-    mirrored = greedy(experiment)
+    mirrored, fit = greedy(experiment), best_fit(experiment)
     world = replace(world, mirror=mirrored.mirror)
     yield Row("the same with images", "greedy, images", mirrored, world)
-    best = best_fit(experiment)
-    spread = replace(world, radial_power=best.radial_power, spacing=best.spacing, nodes=None)
+    spread = replace(world, radial_power=fit.radial_power, spacing=fit.spacing, nodes=None)
     yield Row("and distances, neighbours", "greedy, images", mirrored, spread)
     yield best_row(experiment)
+
+
+def first_row(experiment: Experiment) -> Row:
+    """The first rung of the ladder: the paper's surface, lattice and nearest sample."""
+    return Row("lattice of rates, nearest sample", "surface", surface(experiment), optimal(experiment, CUT))
+
+
+def shells_row(experiment: Experiment, spread: str = "spiral", mesh: Mesh = "fibonacci") -> Row:
+    """The rung of several surfaces, over which states are ``spread`` by a mesh."""
+    states = replace(surface(experiment), shells=SHELLS, steps=SHELL_STEPS, mesh=mesh)
+    return Row(
+        "comb, linear", f"{SHELLS} shells, {spread}", states, replace(AHEAD, tabulate=SHELL_TABLE, lift="linear")
+    )
 
 
 def best_row(experiment: Experiment) -> Row:
@@ -151,9 +160,8 @@ def budgets(experiment: Experiment) -> Iterator[Row]:
 
 def beside(experiment: Experiment) -> Iterator[Row]:
     """EDMD on the very same trajectories."""
-    for fit in BESIDE:
-        size = f"order {fit.order}" if fit.basis == "total" else f"{fit.centres} centres"
-        yield Row(f"EDMD, {fit.basis}, {size}", "greedy", greedy(experiment, plain=True), fit)
+    for label, fit in BESIDE.items():
+        yield Row(label, "greedy", greedy(experiment, plain=True), fit)
 
 
 def ablation(experiment: Experiment) -> Iterator[Row]:
@@ -214,7 +222,3 @@ def greedy(experiment: Experiment, budget: float | None = None, *, plain: bool =
     if not isinstance(sample, GreedySample):
         raise InvalidValueError("the experiment best-eigen must have a sample of kind 'greedy'")
     return replace(sample, mirror=()) if plain else sample
-
-
-def _count(kind: str) -> int:
-    return 2 * PAIRS[kind] + 2
