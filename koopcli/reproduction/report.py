@@ -1,8 +1,8 @@
 """What a reproduction consists of: a method's cells, their scores, and the tables made of them.
 
 A method yields cells, each with the task of its evaluation (``cells``). A run makes the tasks and keeps their scores.
-Tables lay out a block of cells by the cells' own fields (``layout.py``); notes, claims, headlines and pictures build the
-task that they speak of and look its score up (``Run.figures``).
+Tables lay out a block of cells by the cells' own fields (``layout.py``). Notes, claims, headlines and pictures build
+the task that they speak of and look its score up (``Run.figures``).
 """
 
 from __future__ import annotations
