@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 
@@ -52,7 +53,7 @@ def _ladder(first: Run, shown: Sequence[Column]) -> Table:
         lines = by_vehicle(shown, block, "label", "design", "simulated", "seed")
         for label, design, simulated in dict.fromkeys(key[:-1] for key in lines):
             scores = [lines[label, design, simulated, seed] for seed in seeds]
-            scored = next((one for one in scores[0] if one is not None), None)
+            scored = next(filter(None, scores[0]), None)
             below = map("\n".join, zip(*map(score_texts, scores), strict=True))
             rows.append([design, label, f"{simulated:.0f}", *_costs(scored), *below])
     queries = f"{count_text(ball(first.experiment).count)} queries (s)"
@@ -65,8 +66,8 @@ def _ladder(first: Run, shown: Sequence[Column]) -> Table:
 def _costs(scored: Scored | None) -> list[str]:
     if scored is None:
         return ["–", "–", "–"]
-    seconds = [scored.measured.get(name) for name in ("build", "query")]
-    return [str(scored.figures["functions"]), *("–" if one is None else number_text(one, 2) for one in seconds)]
+    seconds = [scored.measured.get(name, math.nan) for name in ("build", "query")]
+    return [str(scored.figures["functions"]), *(number_text(value, 2) for value in seconds)]
 
 
 def _ablation(shown: Sequence[Column]) -> Table:
@@ -161,19 +162,19 @@ def measure(pipeline: Pipeline, cell: blocks.Cell, task: Task) -> Mapping[str, f
     what it misses of the data.
     """
     fit = pipeline.make(task.input("predictor"))
-    found: dict[str, float] = {"build": float(fit.record.provenance["seconds"])}
+    measured: dict[str, float] = {"build": float(fit.record.provenance["seconds"])}
     if isinstance(fit.content, Predictor) and fit.content.regression.missed is not None:
-        found["missed"] = fit.content.regression.missed
+        measured["missed"] = fit.content.regression.missed
     if cell.block in (blocks.LADDER, blocks.BUDGETS, blocks.EDMD):
         test = pipeline.make(task.input("trajectories")).content
         x0, u = np.asarray(test.x[:, 0]), np.asarray(test.u[:])
         start = time.perf_counter()
         fit.content.predict(x0[:1], u[:1])  # a triangulation or a tree is built with the first question
-        found["build"] += time.perf_counter() - start
+        measured["build"] += time.perf_counter() - start
         start = time.perf_counter()
         fit.content.predict(x0, u)
-        found["query"] = time.perf_counter() - start
-    return found
+        measured["query"] = time.perf_counter() - start
+    return measured
 
 
 def _best(column: Column, seed: int) -> Meta | None:

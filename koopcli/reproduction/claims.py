@@ -34,11 +34,11 @@ class Finding:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the paper: ``found`` judges it by a run, ``shows`` is the command that shows it."""
+    """A claim of the paper: ``judged`` is what a run says of it, ``shows`` is the command that shows it."""
 
     text: str
     paper: str
-    found: Callable[[Run], Finding | None]
+    judged: Callable[[Run], Finding | None]
     shows: Callable[[Run], Command]
 
 
@@ -66,7 +66,7 @@ def claims_table(run: Run) -> Table:
     """Claim, paper, here, verdict and command."""
     rows = []
     for claim in CLAIMS:
-        finding = claim.found(run)
+        finding = claim.judged(run)
         if finding is not None:
             rows.append([claim.text, claim.paper, "\n".join(finding.here), finding.verdict, claim.shows(run).text(run)])
     title = "The paper's claims" if run.label == "here" else f"The paper's claims, with {run.label}"
@@ -141,7 +141,7 @@ def _best(run: Run) -> Finding | None:
     counts = Counter(_smallest(means(run, training, edmd.polynomials)) for training in edmd.many)
     if counts:
         total = counts.total()
-        here.append(f"over {total} random draws: {', '.join(f'{one} in {counts[one]}' for one in sorted(counts))}")
+        here.append(f"over {total} random draws: {', '.join(f'{order} in {n}' for order, n in sorted(counts.items()))}")
         verdict += f"; 6 to 8 in {sum(counts[order] for order in (6, 7, 8))} of {total}"
     return Finding(here, verdict)
 
@@ -190,7 +190,8 @@ def _yaw(run: Run) -> Finding | None:
         if not fits:
             continue
         both = product(fits.values(), run.experiment.reproduce.excitations)
-        error = max(run.figures(edmd.evaluated(training, *one))["max_error"]["yaw_rate"] for one in both)
+        tasks = [edmd.evaluated(training, fit, kind) for fit, kind in both]
+        error = max(run.figures(task)["max_error"]["yaw_rate"] for task in tasks)
         said.append(f"{training.name}: {error:.1e} rad/s up to order {max(fits)}")
         holds.append(error <= YAW_EXACT[training.draw])
     return Finding(said, _verdict(holds, "holds, to rounding")) if said else None

@@ -41,7 +41,7 @@ NOTES = (
 def pictures(experiment: Experiment) -> list[Picture]:
     """The vehicle, errors against order, and one predictor in detail: the draw, order and inputs the paper states."""
     edmd, plan, draw = Edmd(experiment), experiment.reproduce, drawer(experiment)
-    kinds = {training.draw: training for training in reversed(edmd.trainings)}.values()
+    each_draw = [training for training in edmd.trainings if training.seed == plan.draw_seeds[0]]
     orders = [order for order in plan.orders if order <= BEST_ORDERS[-1]] or list(plan.orders)
     by_order = {order: edmd.evaluated(edmd.first, fit) for order, fit in edmd.polynomials.items()}
     last = by_order[orders[-1]]
@@ -50,7 +50,8 @@ def pictures(experiment: Experiment) -> list[Picture]:
     about = f"order {orders[-1]}, {data}"
 
     def swept(trainings: Iterable[Training], *kinds: Excitation) -> list[Task]:
-        return [edmd.evaluated(*one) for one in product(trainings, edmd.polynomials.values(), kinds)]
+        sweep = product(trainings, edmd.polynomials.values(), kinds)
+        return [edmd.evaluated(training, fit, kind) for training, fit, kind in sweep]
 
     fits = (edmd.best, edmd.splines, edmd.bilinear, edmd.generator)
     compared = [edmd.evaluated(edmd.first, fit) for fit in fits]
@@ -63,7 +64,7 @@ def pictures(experiment: Experiment) -> list[Picture]:
             "not state the test inputs.",
         ),
         Picture(
-            draw("orders", swept([one for one in edmd.trainings if one in kinds], *plan.excitations)),
+            draw("orders", swept(each_draw, *plan.excitations)),
             "Mean errors for every kind of test inputs: inputs, not the basis, set the floor.",
             leads=True,
         ),

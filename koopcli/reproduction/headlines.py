@@ -120,8 +120,8 @@ def _eigen_race(experiment: Experiment) -> Race:
     assert isinstance(states, GreedySample)
     budget = max(states.budget / SHARE, FEWEST * states.steps * states.dt)
     few = recipes.sample(replace(states, budget=budget, candidates=min(CANDIDATES, states.candidates)))
-    there = replace(best, fit_eigen=replace(best.fit_eigen, trust=False))
-    fit = recipes.fit_eigen(there, recipes.simulation(there, few, plant="slips"))
+    unbounded = replace(best, fit_eigen=replace(best.fit_eigen, trust=False))
+    fit = recipes.fit_eigen(unbounded, recipes.simulation(unbounded, few, plant="slips"))
     label = f"best-eigen on {few.settings.count * states.steps * states.dt:.0f} s of simulation"
     return Race((("the paper's method", evaluation.input("predictor")), (label, fit)), evaluation)
 
