@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +12,9 @@ from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
 from koopcli.config.sampled import INPUTS, Excitation
 from koopcli.config.settings import FitEdmd
 from koopcli.records import Meta
-from koopcli.reproduction.edmd_cells import SPLINES, TEXTBOOK_ORDERS, Edmd, Training
+from koopcli.reproduction import commands
+from koopcli.reproduction.commands import Command
+from koopcli.reproduction.edmd_cells import Edmd, Training
 from koopcli.reproduction.report import Run, Table
 from koopcli.reproduction.texts import number_text
 
@@ -40,26 +41,6 @@ class Claim:
     paper: str
     judged: Callable[[Run], Finding | None]
     shows: Callable[[Run], Command]
-
-
-@dataclass(frozen=True)
-class Command:
-    """A command: its ``words``, what it ``sets``, and the beginnings of those changes of a run that it ``keeps``."""
-
-    words: tuple[str, ...]
-    sets: Mapping[str, object]
-    keeps: tuple[str, ...]
-
-    def text(self, run: Run) -> str:
-        """As it is typed, for the experiment of ``run``."""
-        told = [] if run.base == "paper" else ["--experiment", run.base]
-        for name, value in self.sets.items():
-            told += ["--set", f"{name}={value}"]
-        for change in run.changes:
-            name = change.partition("=")[0]
-            if name not in self.sets and f"{name}.".startswith(self.keeps):
-                told += ["--set", change]
-        return shlex.join(["koop", *self.words, *told])
 
 
 def claims_table(run: Run) -> Table:
@@ -203,66 +184,11 @@ def _verdict(holds: Sequence[bool], yes: str = "holds") -> str:
     return f"holds in {sum(holds)} of {len(holds)} cases" if any(holds) else "does not hold"
 
 
-DATA = ("vehicle.", "sample.", "simulate.")
-SWEPT = tuple(f"fit-edmd.{name}." for name in ("basis", "degree_velocity", "terms", "ridge", "solver"))
-SPLINED = tuple(f"fit-edmd.{name}." for name in ("centres", "placement", "seed"))
-
-
-def _evaluate(run: Run, keeps: tuple[str, ...] = (), **fit: object) -> Command:
-    """The evaluation of a fit on the first training grid, under the inputs that claims are judged by."""
-    sets = {f"fit-edmd.{name}": value for name, value in fit.items()}
-    return Command(("evaluate",), {**sets, **_first_grid(run), **_test(run)}, (*DATA, "test.", "evaluate.", *keeps))
-
-
-def _first_grid(run: Run) -> dict[str, object]:
-    """What the first training grid differs in from the experiment's own."""
-    edmd = Edmd(run.experiment)
-    names = [name for name in ("draw", "seed") if getattr(edmd.first, name) != getattr(edmd.grid, name)]
-    return {f"sample.{name}": getattr(edmd.first, name) for name in names}
-
-
-def _test(run: Run) -> dict[str, object]:
-    edmd = Edmd(run.experiment)
-    return {} if edmd.inputs == edmd.box.excitation else {"test.excitation": edmd.inputs}
-
-
-def _show_floor(run: Run) -> Command:
-    fit = Edmd(run.experiment).generator
-    return _evaluate(run, basis=fit.basis, order=fit.order, terms=fit.terms)
-
-
-def _show_orders(run: Run) -> Command:
-    keeps = (*DATA, "test.", "evaluate.", "reproduce.orders.", *SWEPT)
-    return Command(("plot", "orders"), {**_first_grid(run), **_test(run)}, keeps)
-
-
-def _show_forces(run: Run) -> Command:
-    edmd, largest = Edmd(run.experiment), run.experiment.reproduce.training_forces[-1]
-    shown, sample = _evaluate(run, SWEPT, order=edmd.order), replace(edmd.first, force=largest).of(edmd.grid)
-    sets = {**shown.sets, "sample.levels": f"[{largest:g}]", "sample.columns": sample.columns}
-    return replace(shown, sets=sets)
-
-
-def _show_yaw(run: Run) -> Command:
-    sets = {"fit-edmd.order": Edmd(run.experiment).order, **_first_grid(run)}
-    return Command(("plot", "random-input"), sets, (*DATA, "test.point.", "plot.", *SWEPT))
-
-
 CLAIMS = (
-    Claim("an error of 11.1 % is the best there is", f"{BEST_RMSE} %, test inputs not stated", _floor, _show_floor),
-    Claim(
-        "polynomials beat thin-plate splines",
-        "said, without a figure",
-        _splines,
-        lambda run: _evaluate(run, SPLINED, basis=SPLINES),
-    ),
-    Claim("orders 6 and 7 are best", "6 and 7", _best, _show_orders),
-    Claim(
-        "larger bases get worse",
-        "grows exponentially",
-        _larger,
-        lambda run: _evaluate(run, order=TEXTBOOK_ORDERS[-1], solver="cholesky-monomials"),
-    ),
-    Claim("small training forces beat large ones", "±1 to ±100 N chosen", _forces, _show_forces),
-    Claim("the yaw rate is tracked without error", "without error", _yaw, _show_yaw),
+    Claim("an error of 11.1 % is the best there is", f"{BEST_RMSE} %, test inputs not stated", _floor, commands.best),
+    Claim("polynomials beat thin-plate splines", "said, without a figure", _splines, commands.splines),
+    Claim("orders 6 and 7 are best", "6 and 7", _best, commands.orders),
+    Claim("larger bases get worse", "grows exponentially", _larger, commands.textbook),
+    Claim("small training forces beat large ones", "±1 to ±100 N chosen", _forces, commands.forces),
+    Claim("the yaw rate is tracked without error", "without error", _yaw, commands.yaw),
 )
