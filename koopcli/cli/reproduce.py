@@ -7,6 +7,7 @@ import shlex
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -22,8 +23,8 @@ from koopcli.cli.options import (
     StoreOption,
     WorkersOption,
 )
-from koopcli.config.changes import SECTIONS, flat, nested
-from koopcli.config.experiment import load_experiment
+from koopcli.config.changes import SECTIONS, flat
+from koopcli.config.experiment import Experiment, load_experiment
 from koopcli.console import show_table
 from koopcli.errors import KoopError, UsageError
 
@@ -93,9 +94,8 @@ def reproduce(
         raise UsageError("--beyond belongs to eigenfunctions: koop reproduce eigen --beyond")
     chosen += [BEYOND] if beyond else []
     _refuse(call, chosen)
-    runs = {one.name: _runs(call, base, one) for one in chosen}
-    race = opening.race(chosen, runs[chosen[0].name][0])
-    plans = {one.name: [report.planned(one, run) for run in runs[one.name]] for one in chosen}
+    plans = _plans(call, base, chosen)
+    race = opening.race(chosen, plans[chosen[0].name][0].run)
     everything = [task for some in plans.values() for plan in some for task in plan.tasks]
     call.say_what_vehicle(everything)
     racing = _possible(call, race)
@@ -131,40 +131,57 @@ def _possible(call: Invocation, race: Race) -> list[Task]:
     return tasks
 
 
-def _refuse(call: Invocation, chosen: Sequence[Method]) -> None:
-    """Refuse what the experiments fix, sweep over or have no use for."""
-    from koopcli.stages.effects import why_idle
+def _tasks(method: Method, experiment: Experiment) -> list[Task]:
+    """All that a method makes of an experiment."""
+    from koopcli.reproduction.report import Run, planned
 
+    return planned(method, Run("here", experiment, (), "")).tasks
+
+
+def _refuse(call: Invocation, chosen: Sequence[Method]) -> None:
+    """Refuse what the experiments fix or sweep over."""
     for name, _ in flat(call.changes):
-        read = any(name in method.reads for method in chosen)
-        if not read and name.startswith("fit-") and (idle := why_idle(name, call.experiment, [])):
-            raise UsageError(f"{name} changes nothing here: {idle}")
         if name in NOT_HERE:
             raise UsageError(f"reproduce has its own {name}: change it in the stages' own commands")
         for method in chosen:
             if name in method.fixed:
                 raise UsageError(f"reproduce sweeps {name}: choose what it sweeps with --set '{method.fixed[name]}'")
-        if not any(method.uses(name) for method in chosen):
-            raise UsageError(f"--set {name} changes nothing in reproduce {' or '.join(one.name for one in chosen)}")
         section, _, key = name.partition(".")
         if len({one.name for one in chosen} - {"beyond"}) > 1 and section in ("sample", "test") and "." not in key:
             kinds = "grid.{0} or sample.ellipsoid.{0}" if section == "sample" else "box.{0} or test.ball.{0}"
             raise UsageError(f"--set {name}: say which, {section}.{kinds.format(key)}")
 
 
-def _runs(call: Invocation, base: str, method: Method) -> list[Run]:
-    """The unmodified experiment, and the modified one beside it; a change of the sweep itself applies to both."""
-    from koopcli.reproduction.report import Run
+def _plans(call: Invocation, base: str, chosen: Sequence[Method]) -> dict[str, list[Plan]]:
+    """Of each method the plan of the unmodified experiment, and beside it that of the modified one where that differs;
+    a change of the sweep itself applies to both. Raises ``UsageError`` for a change that makes no difference.
+    """
+    from koopcli.reproduction.report import Run, planned
+    from koopcli.stages.effects import why_idle
 
-    plan = {section: values for section, values in call.changes.items() if section == "reproduce"}
-    used = [(name, value) for name, value in flat(call.changes) if method.uses(name)]
-    said = [f"{name}={str(value).lower() if isinstance(value, bool) else value}" for name, value in used]
-    swept = tuple(change for change in said if change.startswith("reproduce."))
-    changed = tuple(change for change in said if not change.startswith("reproduce."))
-    runs = [Run("here", load_experiment(base, plan), (), base, swept)]
-    if changed:
-        runs.append(Run(" ".join(changed), load_experiment(base, nested(used)), (), base, (*swept, *changed)))
-    return runs
+    swept = {section: values for section, values in call.changes.items() if section == "reproduce"}
+    plain = load_experiment(base, swept)
+    plans: dict[str, list[Plan]] = {}
+    useless = dict(flat(call.changes))
+    for method in chosen:
+        changed = planned(method, Run("here", call.experiment, (), base))
+        used = {}
+        for name, value in flat(call.changes):
+            why = why_idle(name, call.experiment, lambda experiment: _tasks(method, experiment), changed.tasks)  # noqa: B023
+            if why is None:
+                used[name] = value
+                useless.pop(name, None)
+        said = [f"{name}={str(value).lower() if isinstance(value, bool) else value}" for name, value in used.items()]
+        sweep = tuple(change for change in said if change.startswith("reproduce."))
+        changes = tuple(change for change in said if not change.startswith("reproduce."))
+        here = planned(method, Run("here", plain, (), base, sweep))
+        plans[method.name] = [here]
+        if here.tasks != changed.tasks:
+            label = " ".join(changes)
+            plans[method.name].append(replace(changed, run=Run(label, call.experiment, (), base, (*sweep, *changes))))
+    for name in useless:
+        raise UsageError(f"--set {name} changes nothing in reproduce {' or '.join(method.name for method in chosen)}")
+    return plans
 
 
 def _show_what_there_is(call: Invocation, name: str, plans: Sequence[Sequence[Plan]]) -> None:
@@ -225,9 +242,9 @@ def _write_report(
     call: Invocation, name: str, parts: Sequence[Part], shown: Shown | str, identity: str | None = None
 ) -> Path:
     from koopcli import __version__
+    from koopcli.reproduction.layout import full_table
     from koopcli.reproduction.opening import opening
     from koopcli.reproduction.page import Section, page
-    from koopcli.reproduction.report import full_table
     from koopcli.store.files import publish, storage_errors
 
     root = call.pipeline.store.root

@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 import numpy as np
 
 from koopcli.config.experiment import Experiment
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.koopman.predictor.trust import LEVEL
+from koopcli.records import Meta
 from koopcli.reproduction import beyond_cells as blocks
 from koopcli.reproduction import headlines
-from koopcli.reproduction.eigen import FOREIGN
+from koopcli.reproduction.eigen import FIXED
 from koopcli.reproduction.eigen_cells import ball, surface
-from koopcli.reproduction.report import (
-    REDUCED,
-    Method,
-    Picture,
-    Run,
-    Scored,
-    Table,
-    count_text,
-    drawer,
-    has_effect,
-    number_text,
-    score_text,
-)
+from koopcli.reproduction.layout import Column, by_vehicle, columns, labelled, score_texts, vehicle_table
+from koopcli.reproduction.report import REDUCED, Method, Picture, Run, Scored, Table, drawer
+from koopcli.reproduction.texts import count_text, number_text, score_text
 from koopcli.simulation.samples.ball import BallSample
 from koopcli.simulation.samples.ellipsoid import EllipsoidSample
 from koopcli.stages import recipes
@@ -53,24 +44,22 @@ NOTES = (
 
 def tables(runs: Sequence[Run]) -> list[Table]:
     """The ladder with its costs, budgets and EDMD; the ablation; modes; vehicles not seen before; trust."""
-    return [_ladder(runs), _ablation(runs), _modes(runs), _unseen(runs), _trust(runs)]
+    shown, unseen = columns(runs), columns(runs, blocks.unseen)
+    return [_ladder(runs[0], shown), _ablation(shown), _modes(shown), _unseen(runs[0], unseen), _trust(runs)]
 
 
-def _ladder(runs: Sequence[Run]) -> Table:
-    columns = [(run, vehicle) for run in runs for vehicle in _vehicles(run, blocks.LADDER)]
-    seeds = _seeds(runs[0])
-    rows = []
+def _ladder(first: Run, shown: Sequence[Column]) -> Table:
+    seeds, rows = _seeds(first), []
     for block in (blocks.LADDER, blocks.BUDGETS, blocks.EDMD):
-        for label, design, simulated in dict.fromkeys(
-            (s.cell.label, s.cell.design, s.cell.simulated) for run in runs for s in run.scored if s.cell.block == block
-        ):
-            found = [[_find(run, block, label, design, simulated, v, seed) for seed in seeds] for run, v in columns]
-            one = next((first for first, *_ in found if first is not None), None)
-            scores = ["\n".join(score_text(s.figures if s else None) for s in some) for some in found]
-            rows.append([design, label, f"{simulated:.0f}", *_costs(one), *scores])
-    header = ["initial states", "rates, lift", "simulated (s)", "lifted states", "build (s)", "2 000 queries (s)"]
-    header = [name.replace("2 000", count_text(ball(runs[0].experiment).count)) for name in header]
-    header += [_column(run, vehicle) for run, vehicle in columns]
+        lines = by_vehicle(shown, block, "label", "design", "simulated", "seed")
+        for label, design, simulated in dict.fromkeys(key[:-1] for key in lines):
+            scores = [lines[label, design, simulated, seed] for seed in seeds]
+            scored = next(filter(None, scores[0]), None)
+            below = map("\n".join, zip(*map(score_texts, scores), strict=True))
+            rows.append([design, label, f"{simulated:.0f}", *_costs(scored), *below])
+    queries = f"{count_text(ball(first.experiment).count)} queries (s)"
+    header = ["initial states", "rates, lift", "simulated (s)", "lifted states", "build (s)", queries]
+    header += [column.heading for column in shown]
     said = "" if len(seeds) < 2 else f", seeds {' and '.join(map(str, seeds))} below one another"
     return Table(f"Beyond the paper: RMSE in %, mean ± std (median){said}", header, rows, left=2)
 
@@ -78,67 +67,45 @@ def _ladder(runs: Sequence[Run]) -> Table:
 def _costs(scored: Scored | None) -> list[str]:
     if scored is None:
         return ["–", "–", "–"]
-    fit, query = scored.measured.get("build"), scored.measured.get("query")
-    return [
-        str(scored.figures["functions"]),
-        *("–" if one is None else number_text(one, 2) for one in (fit, query)),
+    seconds = [scored.measured.get(name, math.nan) for name in ("build", "query")]
+    return [str(scored.figures["functions"]), *(number_text(value, 2) for value in seconds)]
+
+
+def _ablation(shown: Sequence[Column]) -> Table:
+    best = [_best(column, _seeds(column.run)[0]) for column in shown]
+    rows = [["nothing: best-eigen", *map(score_text, best)], *labelled(shown, blocks.ABLATION)]
+    return vehicle_table("One ingredient taken away: RMSE in %, mean ± std (median)", ["instead"], shown, rows)
+
+
+def _modes(shown: Sequence[Column]) -> Table:
+    rows = [
+        [label, str(modes), *(_missed(scored) for scored in scores)]
+        for (label, modes), scores in by_vehicle(shown, blocks.MODES, "label", "modes").items()
     ]
+    title = "How many modes: what the fit misses of the data / RMSE, in %"
+    return vehicle_table(title, ["rates", "modes"], shown, rows)
 
 
-def _ablation(runs: Sequence[Run]) -> Table:
-    columns = [(run, vehicle) for run in runs for vehicle in _vehicles(run, blocks.ABLATION)]
-    seed = _seeds(runs[0])[0]
-    best = [_best(run, v, seed) for run, v in columns]
-    rows = [["nothing: best-eigen", *(score_text(one.figures if one else None) for one in best)]]
-    for label in _labels(runs, blocks.ABLATION):
-        found = [_first(run, blocks.ABLATION, label, v, seed) for run, v in columns]
-        rows.append([label, *(score_text(one.figures if one else None) for one in found)])
-    title = "One ingredient taken away: RMSE in %, mean ± std (median)"
-    return Table(title, ["instead", *(_column(run, v) for run, v in columns)], rows)
+def _missed(scored: Scored | None) -> str:
+    assert scored is not None, "every vehicle has as many modes"
+    return f"{number_text(scored.measured['missed'])} / {number_text(scored.figures['rmse']['mean'])}"
 
 
-def _modes(runs: Sequence[Run]) -> Table:
-    columns = [(run, vehicle) for run in runs for vehicle in _vehicles(run, blocks.MODES)]
-    rows = []
-    for label, modes in dict.fromkeys(
-        (s.cell.label, s.cell.modes) for run in runs for s in run.scored if s.cell.block == blocks.MODES
-    ):
-        row = [label, str(modes)]
-        for run, vehicle in columns:
-            (found,) = [
-                s
-                for s in run.scored
-                if (s.cell.block, s.cell.label, s.cell.modes, s.cell.vehicle) == (blocks.MODES, label, modes, vehicle)
-            ]
-            row.append(f"{number_text(found.measured['missed'])} / {number_text(found.figures['rmse']['mean'])}")
-        rows.append(row)
-    header = ["rates", "modes", *(_column(run, v) for run, v in columns)]
-    return Table("How many modes: what the fit misses of the data / RMSE, in %", header, rows)
-
-
-def _unseen(runs: Sequence[Run]) -> Table:
-    seeds = _seeds(runs[0])
-    rows = []
-    for run in runs:
-        for vehicle in _vehicles(run, blocks.UNSEEN):
-            found = [_first(run, blocks.UNSEEN, None, vehicle, seed) for seed in seeds]
-            rows.append([_column(run, vehicle), *(score_text(one.figures if one else None) for one in found)])
+def _unseen(first: Run, shown: Sequence[Column]) -> Table:
+    seeds = _seeds(first)
+    rows = [[column.heading, *(score_text(_best(column, seed)) for seed in seeds)] for column in shown]
     header = ["vehicle", *(f"seed {seed}" for seed in seeds)]
     return Table("best-eigen on vehicles that nothing was chosen on: RMSE in %", header, rows)
 
 
 def _trust(runs: Sequence[Run]) -> Table:
+    shown = columns(runs, lambda experiment: [*recipes.vehicles(experiment), *blocks.unseen(experiment)])
     rows = []
-    for run in runs:
-        for block in (blocks.LADDER, blocks.UNSEEN):
-            for vehicle in _vehicles(run, block):
-                for seed in _seeds(run):
-                    best = _best(run, vehicle, seed) or _first(run, blocks.UNSEEN, None, vehicle, seed)
-                    if best is None or best.figures["bound"] is None:
-                        continue
-                    bound = best.figures["bound"]
-                    covered = f"{100 * bound['covered']:.1f}"
-                    rows.append([_column(run, vehicle), str(seed), covered, number_text(bound["median"])])
+    for column, seed in _tested(shown):
+        figures = _best(column, seed)
+        if figures is not None and (bound := figures["bound"]) is not None:
+            covered = f"{100 * bound['covered']:.1f}"
+            rows.append([column.heading, str(seed), covered, number_text(bound["median"])])
     header = ["vehicle", "seed", "errors within their bounds (%)", "median bound (%)"]
     return Table(f"Trust: {100 * LEVEL:.0f} % bounds on the error from each test state, best-eigen", header, rows)
 
@@ -146,21 +113,19 @@ def _trust(runs: Sequence[Run]) -> Table:
 def notes(runs: Sequence[Run]) -> list[str]:
     """What the tables mean, and which of the expectations a run does not meet."""
     said = list(NOTES)
-    for run in runs:
-        for vehicle in _vehicles(run, blocks.EDMD):
-            for seed in _seeds(run):
-                best = _best(run, vehicle, seed)
-                found = [
-                    s for s in run.scored if (s.cell.block, s.cell.vehicle, s.cell.seed) == (blocks.EDMD, vehicle, seed)
-                ]
-                nearest = min(found, key=lambda s: s.figures["rmse"]["mean"], default=None)
-                if best is None or nearest is None:
-                    continue
-                ratio = nearest.figures["rmse"]["mean"] / best.figures["rmse"]["mean"]
-                text = f"{nearest.cell.label} on the same trajectories without images is {ratio:.0f} times worse"
-                if not ratio >= TENFOLD:
-                    text = f"{nearest.cell.label} is only {ratio:.2g} times worse than best-eigen, not ten times"
-                said.append(f"{_column(run, vehicle)}, seed {seed}: {text}.")
+    for column, seed in _tested(columns(runs)):
+        best = _best(column, seed)
+        tasks = {row.label: blocks.evaluated(row, column.experiment, seed) for row in blocks.beside(column.experiment)}
+        scores = {label: column.run.known(task) for label, task in tasks.items()}
+        means = {label: figures["rmse"]["mean"] for label, figures in scores.items() if figures is not None}
+        if best is None or not means:
+            continue
+        nearest = min(means, key=lambda label: means[label])
+        ratio = means[nearest] / best["rmse"]["mean"]
+        text = f"{nearest} on the same trajectories without images is {ratio:.0f} times worse"
+        if not ratio >= TENFOLD:
+            text = f"{nearest} is only {ratio:.2g} times worse than best-eigen, not ten times"
+        said.append(f"{column.heading}, seed {seed}: {text}.")
     full = all(
         surface(run.experiment).count == EllipsoidSample.count and ball(run.experiment).count == BallSample.count
         for run in runs
@@ -170,33 +135,26 @@ def notes(runs: Sequence[Run]) -> list[str]:
 
 def pictures(experiment: Experiment) -> list[Picture]:
     """The frontier; of every vehicle errors before and after, modes and trust; and what each ingredient buys."""
-    found = list(blocks.cells(experiment))
-    seed = experiment.reproduce.seeds[0]
-    draw = drawer(experiment)
-
-    def of(block: str, vehicle: str | None = None) -> list[tuple[blocks.Cell, Task]]:
-        return [
-            (cell, task)
-            for cell, task in found
-            if (cell.block, cell.seed) == (block, seed) and vehicle in (None, cell.vehicle)
-        ]
-
+    draw, seed = drawer(experiment), experiment.reproduce.seeds[0]
     frontier, pictured = [], []
-    for vehicle, _ in recipes.vehicles(experiment):
-        ladder = [task for _, task in of(blocks.LADDER, vehicle)]
-        modes = [task for _, task in of(blocks.MODES, vehicle)]
-        frontier += [ladder[0], ladder[blocks.STACKED], ladder[-1]]
-        frontier += [task for _, task in [*of(blocks.BUDGETS, vehicle), *of(blocks.EDMD, vehicle)[1:]]]
+    for vehicle, own in recipes.vehicles(experiment):
+        first, shells, best = (
+            blocks.evaluated(row(own), own, seed) for row in (blocks.first_row, blocks.shells_row, blocks.best_row)
+        )
+        budgets, edmd, modes = (
+            [blocks.evaluated(row, own, seed) for row in rows(own)]
+            for rows in (blocks.budgets, blocks.beside, blocks.sweep)
+        )
+        frontier += [first, shells, best, *budgets, *edmd[1:]]
         about = f"Errors by initial state, {vehicle}: the paper's surface, lattice and nearest sample, and best-eigen."
-        labels = {ladder[0]: "before", ladder[-1]: "after"}
+        labels = {first: "before", best: "after"}
+        taken = {best: "best-eigen", **{blocks.evaluated(row, own, seed): row.label for row in blocks.ablation(own)}}
         pictured += [
-            Picture(draw("before-after", [ladder[0], ladder[-1]], labels=labels), about),
-            Picture(draw("trust", [ladder[-1]]), f"Errors and the bounds given for them, {vehicle}, best-eigen."),
+            Picture(draw("before-after", list(labels), labels=labels), about),
+            Picture(draw("trust", [best]), f"Errors and the bounds given for them, {vehicle}, best-eigen."),
             Picture(draw("modes", modes), f"How many modes, {vehicle}."),
+            Picture(draw("compare", list(taken), labels=taken), f"One ingredient taken away at a time, {vehicle}."),
         ]
-        taken = {ladder[-1]: "best-eigen", **{task: cell.label for cell, task in of(blocks.ABLATION, vehicle)}}
-        about = f"One ingredient taken away at a time, {vehicle}."
-        pictured.append(Picture(draw("compare", list(taken), labels=taken), about))
     return [Picture(draw("frontier", frontier), "Error against simulated seconds."), *pictured]
 
 
@@ -205,58 +163,32 @@ def measure(pipeline: Pipeline, cell: blocks.Cell, task: Task) -> Mapping[str, f
     what it misses of the data.
     """
     fit = pipeline.make(task.input("predictor"))
-    found: dict[str, float] = {"build": float(fit.record.provenance["seconds"])}
+    measured: dict[str, float] = {"build": float(fit.record.provenance["seconds"])}
     if isinstance(fit.content, Predictor) and fit.content.regression.missed is not None:
-        found["missed"] = fit.content.regression.missed
+        measured["missed"] = fit.content.regression.missed
     if cell.block in (blocks.LADDER, blocks.BUDGETS, blocks.EDMD):
         test = pipeline.make(task.input("trajectories")).content
         x0, u = np.asarray(test.x[:, 0]), np.asarray(test.u[:])
         start = time.perf_counter()
         fit.content.predict(x0[:1], u[:1])  # a triangulation or a tree is built with the first question
-        found["build"] += time.perf_counter() - start
+        measured["build"] += time.perf_counter() - start
         start = time.perf_counter()
         fit.content.predict(x0, u)
-        found["query"] = time.perf_counter() - start
-    return found
+        measured["query"] = time.perf_counter() - start
+    return measured
 
 
-def _find(run: Run, block: str, label: str, design: str, simulated: float, vehicle: str, seed: int) -> Scored | None:
-    wanted = (block, label, design, simulated, vehicle, seed)
-    for scored in run.scored:
-        c = scored.cell
-        if (c.block, c.label, c.design, c.simulated, c.vehicle, c.seed) == wanted:
-            return scored
-    return None
+def _best(column: Column, seed: int) -> Meta | None:
+    return column.run.known(blocks.best(column.experiment, seed))
 
 
-def _first(run: Run, block: str, label: str | None, vehicle: str, seed: int) -> Scored | None:
-    for scored in run.scored:
-        c = scored.cell
-        if (c.block, c.vehicle, c.seed) == (block, vehicle, seed) and label in (None, c.label):
-            return scored
-    return None
-
-
-def _best(run: Run, vehicle: str, seed: int) -> Scored | None:
-    """The last rung of the ladder."""
-    found = [s for s in run.scored if (s.cell.block, s.cell.vehicle, s.cell.seed) == (blocks.LADDER, vehicle, seed)]
-    return found[-1] if found else None
-
-
-def _labels(runs: Sequence[Run], block: str) -> list[str]:
-    return list(dict.fromkeys(s.cell.label for run in runs for s in run.scored if s.cell.block == block))
-
-
-def _vehicles(run: Run, block: str) -> list[str]:
-    return list(dict.fromkeys(s.cell.vehicle for s in run.scored if s.cell.block == block))
+def _tested(shown: Sequence[Column]) -> list[tuple[Column, int]]:
+    """The vehicles of runs, each on the test states of each seed."""
+    return [(column, seed) for column in shown for seed in _seeds(column.run)]
 
 
 def _seeds(run: Run) -> tuple[int, ...]:
     return run.experiment.reproduce.seeds[:2]
-
-
-def _column(run: Run, vehicle: str) -> str:
-    return vehicle if run.label == "here" else f"{vehicle}, {run.label}"
 
 
 METHOD = Method(
@@ -267,12 +199,6 @@ METHOD = Method(
     notes=notes,
     pictures=pictures,
     lead=headlines.BEYOND,
-    fixed={"test.seed": "reproduce.seeds=[4,5]", "test.ball.seed": "reproduce.seeds=[4,5]"},
-    uses=partial(
-        has_effect,
-        plant="slips",
-        swept=("seeds", "beside", "unseen", "pairs", "budgets"),
-        foreign=(*FOREIGN, "fit-eigen"),
-    ),
+    fixed=FIXED,
     measure=measure,
 )

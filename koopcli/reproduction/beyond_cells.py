@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Literal
 
+from koopcli.checks import written
 from koopcli.config.experiment import Experiment
 from koopcli.errors import InvalidValueError
-from koopcli.koopman.bases.thin_plate import Splines
 from koopcli.koopman.edmd.fit import FitEdmd
 from koopcli.koopman.eigen.fit import FitEigen
-from koopcli.koopman.eigen.rates.rates import Rates
-from koopcli.reproduction.eigen_cells import CUT, surface
+from koopcli.reproduction.eigen_cells import CUT, optimal, surface
 from koopcli.simulation.samples.ellipsoid import EllipsoidSample
 from koopcli.simulation.samples.greedy import GreedySample
 from koopcli.simulation.samples.sample import SampleChoice
@@ -23,12 +23,11 @@ SHELLS, SHELL_STEPS, SHELL_TABLE = 6, 80, 0.3  # of the design by shells; s
 TABLE, HORIZON = 0.5, 0.5  # s, of trajectories of one second
 THINNED = 20  # nodes of each trajectory, where neighbours are not chosen apart
 LADDER, BUDGETS, EDMD, ABLATION, UNSEEN, MODES = "ladder", "budgets", "edmd", "ablation", "unseen", "modes"
-BESIDE = (
-    FitEdmd.of(basis="total", order=7),
-    FitEdmd.of(basis="thin-plate", centres=300),
-    FitEdmd.of(basis="total", order=9),
-)  # EDMD of the same trajectories
-STACKED = 5  # which rung of the ladder has shells
+BESIDE = {
+    "EDMD, total, order 7": FitEdmd.of(basis="total", order=7),
+    "EDMD, thin-plate, 300 centres": FitEdmd.of(basis="thin-plate", centres=300),
+    "EDMD, total, order 9": FitEdmd.of(basis="total", order=9),
+}  # of the same trajectories
 STATES = 3  # of the plant on tyres
 
 
@@ -55,6 +54,7 @@ class Row:
     design: str
     states: SampleChoice
     fit: FitEigen | FitEdmd
+    modes: int = 0
 
 
 AHEAD = FitEigen.of(window="horizon", eigenvalues="comb", cut=CUT, tabulate=TABLE, horizon=HORIZON)
@@ -62,94 +62,129 @@ AHEAD = FitEigen.of(window="horizon", eigenvalues="comb", cut=CUT, tabulate=TABL
 
 def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
     """Every cell with its evaluation."""
-    plan = experiment.reproduce
-    everywhere, first = recipes.vehicles(experiment), plan.seeds[0]
-    for (vehicle, there), seed in product(everywhere, plan.seeds[:2]):
-        for row in ladder(there):
-            yield _cell(LADDER, row, there, vehicle, seed)
-        for row in budgets(there):
-            yield _cell(BUDGETS, row, there, vehicle, seed)
-        for row in beside(there):
-            yield _cell(EDMD, row, there, vehicle, seed)
-    for vehicle, there in everywhere:
-        for row in ablation(there):
-            yield _cell(ABLATION, row, there, vehicle, first)
-        for modes, row in sweep(there):
-            cell, task = _cell(MODES, row, there, vehicle, first)
-            yield replace(cell, modes=modes), task
-    for vehicle, there in unseen(experiment):
-        for seed in plan.seeds[:2]:
-            yield _cell(UNSEEN, _best_row(there), there, vehicle, seed)
+    seeds, everywhere = experiment.reproduce.seeds[:2], recipes.vehicles(experiment)
+    for (vehicle, own), seed in product(everywhere, seeds):
+        yield from _cells({LADDER: ladder(own), BUDGETS: budgets(own), EDMD: beside(own)}, vehicle, own, seed)
+    for vehicle, own in everywhere:
+        yield from _cells({ABLATION: ablation(own), MODES: sweep(own)}, vehicle, own, seeds[0])
+    for (vehicle, own), seed in product(unseen(experiment), seeds):
+        yield from _cells({UNSEEN: [best_row(own)]}, vehicle, own, seed)
 
 
-def ladder(there: Experiment) -> Iterator[Row]:
+def _cells(
+    blocks: Mapping[str, Iterable[Row]], vehicle: str, own: Experiment, seed: int
+) -> Iterator[tuple[Cell, Task]]:
+    """The rows of blocks put to a vehicle and to the test states of a seed."""
+    for block, rows in blocks.items():
+        for row in rows:
+            task = evaluated(row, own, seed)
+            simulation = task.input("predictor").ancestor("simulate").settings
+            simulated = row.states.trajectories * simulation.steps * simulation.dt
+            yield Cell(block, row.label, row.design, simulated, vehicle, seed, row.modes), task
+
+
+def evaluated(row: Row, experiment: Experiment, seed: int) -> Task:
+    """The evaluation of a row on the test states of a seed, where predictions are not lifted afresh at every step, and
+    trajectories are as long as their samples say.
+    """
+    own = replace(
+        experiment,
+        simulate=replace(experiment.simulate, steps=None, plant=None),
+        evaluate=replace(experiment.evaluate, relift=False),
+    )
+    training = recipes.simulation(own, recipes.sample(row.states), plant="slips")
+    if isinstance(row.fit, FitEigen):
+        predictor = recipes.fit_eigen(replace(own, fit_eigen=row.fit), training)
+    else:
+        predictor = recipes.fit_edmd(replace(own, fit_edmd=row.fit), training)
+    test = recipes.test_set(experiment, predictor.ancestor("simulate").settings, seed=seed)
+    return recipes.evaluation(own, predictor, test)
+
+
+def best(experiment: Experiment, seed: int) -> Task:
+    """The evaluation of best-eigen on the test states of a seed."""
+    return evaluated(best_row(experiment), experiment, seed)
+
+
+def ladder(experiment: Experiment) -> Iterator[Row]:
     """From the paper's reading to the best predictor, an ingredient at a time."""
-    gamma, shells = surface(there), f"{SHELLS} shells"
-    paper = FitEigen.of(boundary="optimal", cut=CUT, tabulate=there.fit_eigen.tabulate)
-    comb = replace(paper, eigenvalues="comb")
-    yield Row("lattice of rates, nearest sample", "surface", gamma, paper)
-    yield Row("lattice of rates, linear", "surface", gamma, replace(paper, lift="linear"))
+    gamma, paper = surface(experiment), optimal(experiment, CUT)
+    comb, varpro = paper.but(eigenvalues="comb"), paper.but(eigenvalues="varpro")
+    yield first_row(experiment)
+    yield Row("lattice of rates, linear", "surface", gamma, paper.but(lift="linear"))
     yield Row("comb of rates, nearest sample", "surface", gamma, comb)
-    yield Row(f"{_count('varpro')} best rates, nearest sample", "surface", gamma, replace(paper, eigenvalues="varpro"))
-    yield Row("comb of rates, linear", "surface", gamma, replace(comb, lift="linear"))
-    stacked = replace(gamma, shells=SHELLS, steps=SHELL_STEPS)
-    ahead = replace(AHEAD, tabulate=SHELL_TABLE, lift="linear")
-    yield Row("comb, linear", f"{shells}, spiral", replace(stacked, mesh="fibonacci"), ahead)
-    yield Row("comb, linear", f"{shells}, mesh", replace(stacked, mesh="sphere"), ahead)
-    filled = greedy(there, plain=True)
-    linear, spline = replace(AHEAD, lift="linear"), replace(AHEAD, lift="polyharmonic", nodes=THINNED)
+    yield Row(f"{varpro.eigenvalues.count(STATES)} best rates, nearest sample", "surface", gamma, varpro)
+    yield Row("comb of rates, linear", "surface", gamma, comb.but(lift="linear"))
+    yield shells_row(experiment)
+    yield shells_row(experiment, "mesh", "sphere")
+    filled, linear = greedy(experiment, plain=True), AHEAD.but(lift="linear")
+    splines = AHEAD.but(lift="polyharmonic", nodes=THINNED)
     yield Row("comb, linear", "greedy", filled, linear)
-    yield Row("comb, splines", "greedy", filled, spline)
-    yield Row("comb, linear, world", "greedy", filled, replace(linear, coordinates="world"))
-    world = replace(spline, coordinates="world")
+    yield Row("comb, splines", "greedy", filled, splines)
+    yield Row("comb, linear, world", "greedy", filled, linear.but(coordinates="world"))
+    world = splines.but(coordinates="world")
     yield Row("comb, splines, world", "greedy", filled, world)
-    mirrored = greedy(there)
-    world = replace(world, mirror=mirrored.mirror)
+    mirrored, fit = greedy(experiment), best_fit(experiment)
+    world = world.but(mirror=mirrored.mirror)
     yield Row("the same with images", "greedy, images", mirrored, world)
-    best = best_fit(there)
-    spread = replace(world, radial_power=best.radial_power, spacing=best.spacing, nodes=None)
+    spread = world.but(radial_power=fit.radial_power, spacing=fit.lift.spacing, nodes=None)
     yield Row("and distances, neighbours", "greedy, images", mirrored, spread)
-    yield _best_row(there)
+    yield best_row(experiment)
 
 
-def _best_row(there: Experiment) -> Row:
-    return Row("and continuation: best-eigen", "greedy, images", greedy(there), best_fit(there))
+def first_row(experiment: Experiment) -> Row:
+    """The first rung of the ladder: the paper's surface, lattice and nearest sample."""
+    return Row("lattice of rates, nearest sample", "surface", surface(experiment), optimal(experiment, CUT))
 
 
-def budgets(there: Experiment) -> Iterator[Row]:
+def shells_row(
+    experiment: Experiment, spread: str = "spiral", mesh: Literal["sphere", "fibonacci"] = "fibonacci"
+) -> Row:
+    """The rung of several surfaces, over which states are ``spread`` by a mesh."""
+    states = replace(surface(experiment), shells=SHELLS, steps=SHELL_STEPS, mesh=mesh)
+    return Row("comb, linear", f"{SHELLS} shells, {spread}", states, AHEAD.but(tabulate=SHELL_TABLE, lift="linear"))
+
+
+def best_row(experiment: Experiment) -> Row:
+    """The last rung of the ladder."""
+    return Row("and continuation: best-eigen", "greedy, images", greedy(experiment), best_fit(experiment))
+
+
+def budgets(experiment: Experiment) -> Iterator[Row]:
     """The best predictor on other budgets, and on all of them without mirror images."""
-    main, *others = there.reproduce.budgets
-    fit = best_fit(there).but(trust=False)
-    alone = replace(fit, mirror=())
-    yield Row("best-eigen without images", "greedy", greedy(there, main, plain=True), alone)
+    main, *others = experiment.reproduce.budgets
+    fit = best_fit(experiment).but(trust=False)
+    alone = fit.but(mirror=())
+    yield Row("best-eigen without images", "greedy", greedy(experiment, main, plain=True), alone)
     for budget in others:
-        yield Row("best-eigen without images", "greedy", greedy(there, budget, plain=True), alone)
-        yield Row("best-eigen", "greedy, images", greedy(there, budget), fit)
+        yield Row("best-eigen without images", "greedy", greedy(experiment, budget, plain=True), alone)
+        yield Row("best-eigen", "greedy, images", greedy(experiment, budget), fit)
 
 
-def beside(there: Experiment) -> Iterator[Row]:
+def beside(experiment: Experiment) -> Iterator[Row]:
     """EDMD on the very same trajectories."""
-    for fit in BESIDE:
-        size = f"{fit.basis.centres} centres" if isinstance(fit.basis, Splines) else f"order {fit.basis.order}"
-        yield Row(f"EDMD, {fit.basis.kind}, {size}", "greedy", greedy(there, plain=True), fit)
+    for label, fit in BESIDE.items():
+        yield Row(label, "greedy", greedy(experiment, plain=True), fit)
 
 
-def ablation(there: Experiment) -> Iterator[Row]:
+def ablation(experiment: Experiment) -> Iterator[Row]:
     """The best predictor with one ingredient less, named by what is there instead."""
-    best, states = best_fit(there).but(trust=False), greedy(there)  # which moves no prediction
-    known = round(best.tabulate / there.simulate.dt) - round((best.horizon or HORIZON) / there.simulate.dt)
-    shorter = best.but(rounds=0, tabulate=known * there.simulate.dt)
+    best, states = best_fit(experiment).but(trust=False), greedy(experiment)  # which moves no prediction
+    known = round(best.tabulate / experiment.simulate.dt) - round(
+        (written(best)["horizon"] or HORIZON) / experiment.simulate.dt
+    )
+    shorter = best.but(rounds=0, tabulate=known * experiment.simulate.dt)
     less: list[tuple[str, SampleChoice, FitEigen]] = [
         ("rates: lattice", states, best.but(eigenvalues="dmd")),
         ("lift: linear", states, best.but(lift="linear")),
         ("lift: moving least squares", states, best.but(lift="mls")),
         ("lift: nearest sample", states, best.but(lift="nearest")),
         ("coordinates: state", states, best.but(coordinates="state")),
-        ("distances: plain", states, replace(best, radial_power=1.0)),
+        ("distances: plain", states, best.but(radial_power=1.0)),
         ("neighbours: any", states, best.but(spacing=None)),
         ("no continuation", states, shorter),
-        ("no images", greedy(there, plain=True), replace(best, mirror=())),
-        ("all starts on Γ", _on_surface(there, states), best),
+        ("no images", greedy(experiment, plain=True), best.but(mirror=())),
+        ("all starts on Γ", _on_surface(experiment, states), best),
         ("window: trajectory", states, _along(shorter)),
     ]
     for label, sample, fit in less:
@@ -161,16 +196,16 @@ def _along(fit: FitEigen) -> FitEigen:
     return fit.but(window="trajectory", boundary="optimal")
 
 
-def _on_surface(there: Experiment, like: GreedySample) -> EllipsoidSample:
-    return replace(surface(there), mesh="fibonacci", count=max(10, like.count), steps=like.steps)
+def _on_surface(experiment: Experiment, like: GreedySample) -> EllipsoidSample:
+    return replace(surface(experiment), mesh="fibonacci", count=max(10, like.count), steps=like.steps)
 
 
-def sweep(there: Experiment) -> Iterator[tuple[int, Row]]:
+def sweep(experiment: Experiment) -> Iterator[Row]:
     """How many rates of which kind, everything else as in the best predictor but for what takes long."""
-    best = best_fit(there).but(rounds=0, tabulate=TABLE, trust=False, spacing=None, nodes=THINNED)
-    states = greedy(there)
-    for fit in recipes.mode_fits(best, there.reproduce.pairs):
-        yield fit.eigenvalues.count(STATES), Row(fit.eigenvalues.kind, "greedy, images", states, fit)
+    best = best_fit(experiment).but(rounds=0, tabulate=TABLE, trust=False, spacing=None, nodes=THINNED)
+    for fit in recipes.mode_fits(best, experiment.reproduce.pairs):
+        modes = fit.eigenvalues.count(STATES)
+        yield Row(fit.eigenvalues.kind, "greedy, images", greedy(experiment), fit, modes)
 
 
 def unseen(experiment: Experiment) -> list[tuple[str, Experiment]]:
@@ -180,37 +215,14 @@ def unseen(experiment: Experiment) -> list[tuple[str, Experiment]]:
     return recipes.vehicles(others)[1:]
 
 
-def best_fit(there: Experiment) -> FitEigen:
+def best_fit(experiment: Experiment) -> FitEigen:
     """The fit of the experiment best-eigen."""
-    return recipes.best_eigen(there).fit_eigen
+    return recipes.best_eigen(experiment).fit_eigen
 
 
-def greedy(there: Experiment, budget: float | None = None, *, plain: bool = False) -> GreedySample:
+def greedy(experiment: Experiment, budget: float | None = None, *, plain: bool = False) -> GreedySample:
     """Its design for another vehicle, on the main budget unless told otherwise; ``plain``: without images."""
-    found = recipes.best_eigen(there, budget).sample("greedy")
-    if not isinstance(found, GreedySample):
+    sample = recipes.best_eigen(experiment, budget).sample("greedy")
+    if not isinstance(sample, GreedySample):
         raise InvalidValueError("the experiment best-eigen must have a sample of kind 'greedy'")
-    return replace(found, mirror=()) if plain else found
-
-
-def _cell(block: str, row: Row, there: Experiment, vehicle: str, seed: int) -> tuple[Cell, Task]:
-    """A row put to a vehicle and to the test states of a seed; predictions are not lifted afresh at every step."""
-    training = recipes.simulation(_simulating(there), recipes.sample(row.states), plant="slips")
-    if isinstance(row.fit, FitEigen):
-        predictor = recipes.fit_eigen(replace(there, fit_eigen=row.fit), training)
-    else:
-        predictor = recipes.fit_edmd(replace(there, fit_edmd=row.fit), training)
-    test = recipes.test_set(there, predictor.ancestor("simulate").settings, seed=seed)
-    once = replace(there, evaluate=replace(there.evaluate, relift=False))
-    simulated = row.states.trajectories * training.settings.steps * training.settings.dt
-    cell = Cell(block, row.label, row.design, simulated, vehicle, seed)
-    return cell, recipes.evaluation(once, predictor, test)
-
-
-def _simulating(there: Experiment) -> Experiment:
-    """The experiment with trajectories as long as their samples say."""
-    return replace(there, simulate=replace(there.simulate, steps=None, plant=None))
-
-
-def _count(kind: str) -> int:
-    return Rates.kinds()[kind]().count(STATES)
+    return replace(sample, mirror=()) if plain else sample

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 
-from koopcli.checks import written
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
+from koopcli.koopman.edmd.fit import FitEdmd
 from koopcli.records import Meta
-from koopcli.reproduction import edmd_cells as blocks
-from koopcli.reproduction.report import Run, Table, number_text
-from koopcli.simulation.samples.sample import INPUTS
+from koopcli.reproduction import commands
+from koopcli.reproduction.commands import Command
+from koopcli.reproduction.edmd_cells import Edmd, Training
+from koopcli.reproduction.report import Run, Table
+from koopcli.reproduction.texts import number_text
+from koopcli.simulation.samples.sample import INPUTS, Excitation
 
 CLEAR = 1.02  # a ratio of two mean errors from which one is called larger
 WORSE = 1.05  # the same, from the best order to the largest basis
 YAW_EXACT = {"even": 1e-9, "chebyshev": 1e-9, "random": 1e-6}  # rad/s: what rounding leaves, by training draw
+FORCED: tuple[Excitation, ...] = ("none", "fresh")  # inputs that training forces of one size are judged by
 YAW_ORDERS = {"even": 10, "chebyshev": 10, "random": 7}
 
 
@@ -31,68 +35,41 @@ class Finding:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the paper: ``found`` judges it by a run, ``shows`` is the command that shows it."""
+    """A claim of the paper: ``judged`` is what a run says of it, ``shows`` is the command that shows it."""
 
     text: str
     paper: str
-    found: Callable[[Run], Finding | None]
+    judged: Callable[[Run], Finding | None]
     shows: Callable[[Run], Command]
-
-
-@dataclass(frozen=True)
-class Command:
-    """A command: its ``words``, what it ``sets``, and the beginnings of those changes of a run that it ``keeps``."""
-
-    words: tuple[str, ...]
-    sets: Mapping[str, object]
-    keeps: tuple[str, ...]
-
-    def text(self, run: Run) -> str:
-        """As it is typed, for the experiment of ``run``."""
-        told = [] if run.base == "paper" else ["--experiment", run.base]
-        for name, value in self.sets.items():
-            told += ["--set", f"{name}={value}"]
-        for change in run.changes:
-            name = change.partition("=")[0]
-            if name not in self.sets and f"{name}.".startswith(self.keeps):
-                told += ["--set", change]
-        return shlex.join(["koop", *self.words, *told])
 
 
 def claims_table(run: Run) -> Table:
     """Claim, paper, here, verdict and command."""
     rows = []
     for claim in CLAIMS:
-        finding = claim.found(run)
+        finding = claim.judged(run)
         if finding is not None:
             rows.append([claim.text, claim.paper, "\n".join(finding.here), finding.verdict, claim.shows(run).text(run)])
     title = "The paper's claims" if run.label == "here" else f"The paper's claims, with {run.label}"
     return Table(title, ["claim", "paper", "here", "verdict", "command"], rows, words=True)
 
 
-def scores(run: Run, block: str, **wanted: object) -> list[tuple[blocks.Cell, Meta]]:
-    """The cells of a block with what is ``wanted`` of their fields, and their figures."""
-    return [
-        (scored.cell, scored.figures)
-        for scored in run.scored
-        if scored.cell.block == block and all(getattr(scored.cell, name) == value for name, value in wanted.items())
-    ]
-
-
 def mean(figures: Meta) -> float:
     """The mean error in percent; infinite where predictions diverged, which leaves them out of it."""
-    found = float(figures["rmse"]["mean"])
-    return math.inf if figures["diverged"] or math.isnan(found) else found
+    value = float(figures["rmse"]["mean"])
+    return math.inf if figures["diverged"] or math.isnan(value) else value
 
 
-def by_order(run: Run, draw: str, excitation: str, block: str = blocks.SWEEP) -> dict[int, float]:
-    """The mean error of every order on a training draw."""
-    found = scores(run, block, draw=draw, excitation=excitation)
-    return {cell.order: mean(figures) for cell, figures in found if cell.order is not None}
+def means(
+    run: Run, training: Training, fits: Mapping[int, FitEdmd], kind: Excitation | None = None
+) -> dict[int, float]:
+    """The mean errors of fits of several orders, under the inputs that claims are judged by unless others are said."""
+    tasks = {order: Edmd(run.experiment).evaluated(training, fit, kind) for order, fit in fits.items()}
+    return {order: mean(run.figures(task)) for order, task in tasks.items()}
 
 
-def _draws(run: Run) -> list[str]:
-    return [training.name for training in blocks.trainings(run.experiment)]
+def _smallest(means: Mapping[int, float]) -> int:
+    return min(means, key=lambda order: means[order])
 
 
 def _percent(value: float) -> str:
@@ -101,82 +78,70 @@ def _percent(value: float) -> str:
 
 def _floor(run: Run) -> Finding:
     """The best linear predictor, and the bilinear ones, on the first training draw."""
-    draw, said = _draws(run)[0], list[str]()
+    edmd, said = Edmd(run.experiment), list[str]()
     best: dict[str, float] = {}
-    for excitation in run.experiment.reproduce.excitations:
-        linear = by_order(run, draw, excitation)
-        order = min(linear, key=lambda one: linear[one])
-        text = f"{INPUTS[excitation]}: {_percent(linear[order])} (order {order})"
-        for terms in ("bilinear", "generator"):
-            label = blocks.outlook_name(run.experiment, blocks.bilinear(run.experiment, terms))
-            ((_, figures),) = scores(run, blocks.OTHERS, label=label, draw=draw, excitation=excitation)
-            text += f", {terms} {_percent(mean(figures))}"
-            best[excitation] = min(mean(figures), best.get(excitation, math.inf))
-            functions = figures["functions"]
+    for kind in run.experiment.reproduce.excitations:
+        linear = means(run, edmd.first, edmd.polynomials, kind)
+        order = _smallest(linear)
+        text = f"{INPUTS[kind]}: {_percent(linear[order])} (order {order})"
+        for fit in (edmd.bilinear, edmd.generator):
+            figures = run.figures(edmd.evaluated(edmd.first, fit, kind))
+            text += f", {fit.terms.kind} {_percent(mean(figures))}"
+            best[kind] = min(mean(figures), best.get(kind, math.inf))
         said.append(text)
     worst = max(best.values())
     if not worst < BEST_RMSE:
         return Finding(said, "holds")
-    ratio = f"{BEST_RMSE / worst:.0f} times better with {functions} functions"
+    ratio = f"{BEST_RMSE / worst:.0f} times better with {figures['functions']} functions"
     return Finding(said, f"does not hold: bilinear terms are {ratio}, where a constant B has a floor")
 
 
-def _splines(run: Run) -> Finding | None:
+def _splines(run: Run) -> Finding:
     """Polynomials of the paper's best order beside splines, wherever both were fitted."""
-    excitation, order = blocks.excitation(run.experiment), blocks.best_order(run.experiment)
-    said, holds = [], []
-    for cell, figures in scores(run, blocks.OTHERS, order=None, excitation=excitation):
-        polynomial, spline = by_order(run, cell.draw, excitation)[order], mean(figures)
-        said.append(f"{cell.draw}: {_percent(polynomial)} (order {order}), splines {_percent(spline)}")
+    edmd, said, holds = Edmd(run.experiment), [], []
+    for training in edmd.both:
+        polynomial, spline = (mean(run.figures(edmd.evaluated(training, fit))) for fit in (edmd.best, edmd.splines))
+        said.append(f"{training.name}: {_percent(polynomial)} (order {edmd.order}), splines {_percent(spline)}")
         holds.append(polynomial < spline)
-    if not said:
-        return None
     return Finding(said, _verdict(holds))
 
 
 def _best(run: Run) -> Finding | None:
     """The order of the smallest mean on every training draw, and over many where they were tried."""
-    excitation = blocks.excitation(run.experiment)
-    if not set(BEST_ORDERS) & set(run.experiment.reproduce.orders):
+    edmd = Edmd(run.experiment)
+    if not set(BEST_ORDERS) & set(edmd.polynomials):
         return None
-    found = {draw: by_order(run, draw, excitation) for draw in _draws(run)}
-    best = {draw: min(means, key=lambda order: means[order]) for draw, means in found.items()}
-    here = [f"{draw}: {order} ({_percent(found[draw][order])})" for draw, order in best.items()]
-    near = [
-        draw
-        for draw, means in found.items()
-        if min((means[o] for o in BEST_ORDERS if o in means), default=math.inf) <= CLEAR * means[best[draw]]
-    ]
-    verdict = _verdict([order in BEST_ORDERS for order in best.values()])
-    verdict += f"; within 2 % of the best in {len(near)} of {len(best)}"
-    many = [cell.draw for cell, _ in scores(run, blocks.DRAWS)]
-    if many:
-        counts = Counter(
-            min(means, key=lambda order: means[order])
-            for means in (by_order(run, draw, excitation, blocks.DRAWS) for draw in dict.fromkeys(many))
-        )
-        total = sum(counts.values())
-        here.append(f"over {total} random draws: {', '.join(f'{one} in {counts[one]}' for one in sorted(counts))}")
+    here, near, holds = [], [], []
+    for training in edmd.trainings:
+        errors = means(run, training, edmd.polynomials)
+        order = _smallest(errors)
+        here.append(f"{training.name}: {order} ({_percent(errors[order])})")
+        near.append(min((errors[o] for o in BEST_ORDERS if o in errors), default=math.inf) <= CLEAR * errors[order])
+        holds.append(order in BEST_ORDERS)
+    verdict = f"{_verdict(holds)}; within 2 % of the best in {sum(near)} of {len(near)}"
+    counts = Counter(_smallest(means(run, training, edmd.polynomials)) for training in edmd.many)
+    if counts:
+        total = counts.total()
+        here.append(f"over {total} random draws: {', '.join(f'{order} in {n}' for order, n in sorted(counts.items()))}")
         verdict += f"; 6 to 8 in {sum(counts[order] for order in (6, 7, 8))} of {total}"
     return Finding(here, verdict)
 
 
 def _larger(run: Run) -> Finding | None:
     """The largest basis over the best, and the textbook's regression beside it."""
-    excitation = blocks.excitation(run.experiment)
-    if max(run.experiment.reproduce.orders) <= BEST_ORDERS[-1]:
+    edmd = Edmd(run.experiment)
+    if max(edmd.polynomials) <= BEST_ORDERS[-1]:
         return None
     said, worse = [], []
-    for draw in _draws(run):
-        means = by_order(run, draw, excitation)
-        best, last = min(means.values()), max(means)
-        said.append(f"{draw}: {_percent(means[last])} (order {last}), best {_percent(best)}")
-        worse.append(means[last] > WORSE * best)
-    text = _verdict(worse)
-    textbook = by_order(run, _draws(run)[0], excitation, blocks.TEXTBOOK)
+    for training in edmd.trainings:
+        errors = means(run, training, edmd.polynomials)
+        best, last = min(errors.values()), max(errors)
+        said.append(f"{training.name}: {_percent(errors[last])} (order {last}), best {_percent(best)}")
+        worse.append(errors[last] > WORSE * best)
+    text, textbook = _verdict(worse), means(run, edmd.first, edmd.textbook)
     if textbook:
-        listed = ", ".join(f"{_percent(value)} (order {order})" for order, value in sorted(textbook.items()))
-        said.append(f"by normal equations of monomials, {_draws(run)[0]}: {listed}")
+        listed = ", ".join(f"{_percent(value)} (order {order})" for order, value in textbook.items())
+        said.append(f"by normal equations of monomials, {edmd.first.name}: {listed}")
         if max(textbook.values()) > WORSE * min(textbook.values()):
             text += ", by extrapolation" if any(worse) else ""
             text += "; with the textbook's normal equations it does, by rounding"
@@ -184,35 +149,31 @@ def _larger(run: Run) -> Finding | None:
 
 
 def _forces(run: Run) -> Finding | None:
-    """The best order trained with forces of one size."""
-    kinds = [kind for kind in ("none", "fresh") if kind in run.experiment.reproduce.excitations]
-    order, said, holds = blocks.best_order(run.experiment), [], []
-    for kind in kinds:
-        both = scores(run, blocks.FORCES, excitation=kind, order=order)
-        rows = [(cell, figures) for cell, figures in both if "bilinear" not in cell.label]
-        if len(rows) < 2:
-            continue
-        means = [mean(figures) for _, figures in rows]
-        sizes = [cell.label.rpartition(", ")[2] for cell, _ in rows]
-        listed = ", ".join(f"{size} {_percent(value)}" for size, value in zip(sizes, means, strict=True))
-        said.append(f"{INPUTS[kind]}: {listed}")
-        holds.append(means[-1] > CLEAR * means[0])
+    """The best order trained with forces of one size, by which linear predictors are judged."""
+    edmd, plan = Edmd(run.experiment), run.experiment.reproduce
+    if len(plan.training_forces) < 2 or edmd.best.terms.kind != "linear":
+        return None
+    said, holds = [], []
+    for kind in [kind for kind in FORCED if kind in plan.excitations]:
+        trainings = {force: replace(edmd.first, force=force) for force in plan.training_forces}
+        errors = {f: mean(run.figures(edmd.evaluated(each, edmd.best, kind))) for f, each in trainings.items()}
+        said.append(f"{INPUTS[kind]}: {', '.join(f'±{f:g} N {_percent(value)}' for f, value in errors.items())}")
+        smallest, *_, largest = errors.values()
+        holds.append(largest > CLEAR * smallest)
     return Finding(said, _verdict(holds)) if said else None
 
 
 def _yaw(run: Run) -> Finding | None:
     """The largest yaw-rate error up to the order to which rounding is harmless, of each kind of draw."""
-    said, holds = [], []
-    for training in blocks.trainings(run.experiment):
-        found = [
-            (cell.order, figures["max_error"]["yaw_rate"])
-            for cell, figures in scores(run, blocks.SWEEP, draw=training.name)
-            if cell.order is not None and cell.order <= YAW_ORDERS[training.draw]
-        ]
-        if not found:
+    edmd, said, holds = Edmd(run.experiment), [], []
+    for training in edmd.trainings:
+        fits = {order: fit for order, fit in edmd.polynomials.items() if order <= YAW_ORDERS[training.draw]}
+        if not fits:
             continue
-        error = max(value for _, value in found)
-        said.append(f"{training.name}: {error:.1e} rad/s up to order {max(order for order, _ in found)}")
+        both = product(fits.values(), run.experiment.reproduce.excitations)
+        tasks = [edmd.evaluated(training, fit, kind) for fit, kind in both]
+        error = max(run.figures(task)["max_error"]["yaw_rate"] for task in tasks)
+        said.append(f"{training.name}: {error:.1e} rad/s up to order {max(fits)}")
         holds.append(error <= YAW_EXACT[training.draw])
     return Finding(said, _verdict(holds, "holds, to rounding")) if said else None
 
@@ -223,68 +184,11 @@ def _verdict(holds: Sequence[bool], yes: str = "holds") -> str:
     return f"holds in {sum(holds)} of {len(holds)} cases" if any(holds) else "does not hold"
 
 
-DATA = ("vehicle.", "sample.", "simulate.")
-SWEPT = tuple(f"fit-edmd.{name}." for name in ("basis", "degree_velocity", "terms", "ridge", "solver"))
-SPLINED = tuple(f"fit-edmd.{name}." for name in ("centres", "placement", "seed"))
-
-
-def _evaluate(run: Run, keeps: tuple[str, ...] = (), **fit: object) -> Command:
-    """The evaluation of a fit on the first training grid, under the inputs that claims are judged by."""
-    sets = {f"fit-edmd.{name}": value for name, value in fit.items()}
-    return Command(("evaluate",), {**sets, **_first_grid(run), **_test(run)}, (*DATA, "test.", "evaluate.", *keeps))
-
-
-def _first_grid(run: Run) -> dict[str, object]:
-    """What the first training grid differs in from the experiment's own."""
-    first, own = blocks.trainings(run.experiment)[0], blocks.grid(run.experiment)
-    sets: dict[str, object] = {} if first.draw == own.draw else {"sample.draw": first.draw}
-    return sets if first.seed == own.seed else {**sets, "sample.seed": first.seed}
-
-
-def _test(run: Run) -> dict[str, object]:
-    excitation = blocks.excitation(run.experiment)
-    return {} if excitation == blocks.box(run.experiment).excitation else {"test.excitation": excitation}
-
-
-def _show_floor(run: Run) -> Command:
-    fit = blocks.bilinear(run.experiment, "generator")
-    settings = written(fit)
-    return _evaluate(run, **{name: settings[name] for name in ("basis", "order", "terms")})
-
-
-def _show_orders(run: Run) -> Command:
-    keeps = (*DATA, "test.", "evaluate.", "reproduce.orders.", *SWEPT)
-    return Command(("plot", "orders"), {**_first_grid(run), **_test(run)}, keeps)
-
-
-def _show_forces(run: Run) -> Command:
-    sample, order = blocks.grid(run.experiment), blocks.best_order(run.experiment)
-    shown = _evaluate(run, SWEPT, order=order)
-    largest = f"[{run.experiment.reproduce.training_forces[-1]:g}]"
-    columns = len(sample.levels) * sample.columns
-    return Command(shown.words, {**shown.sets, "sample.levels": largest, "sample.columns": columns}, shown.keeps)
-
-
-def _show_yaw(run: Run) -> Command:
-    sets = {"fit-edmd.order": blocks.best_order(run.experiment), **_first_grid(run)}
-    return Command(("plot", "random-input"), sets, (*DATA, "test.point.", "plot.", *SWEPT))
-
-
 CLAIMS = (
-    Claim("an error of 11.1 % is the best there is", f"{BEST_RMSE} %, test inputs not stated", _floor, _show_floor),
-    Claim(
-        "polynomials beat thin-plate splines",
-        "said, without a figure",
-        _splines,
-        lambda run: _evaluate(run, SPLINED, basis=blocks.SPLINES),
-    ),
-    Claim("orders 6 and 7 are best", "6 and 7", _best, _show_orders),
-    Claim(
-        "larger bases get worse",
-        "grows exponentially",
-        _larger,
-        lambda run: _evaluate(run, order=blocks.TEXTBOOK_ORDERS[-1], solver="cholesky-monomials"),
-    ),
-    Claim("small training forces beat large ones", "±1 to ±100 N chosen", _forces, _show_forces),
-    Claim("the yaw rate is tracked without error", "without error", _yaw, _show_yaw),
+    Claim("an error of 11.1 % is the best there is", f"{BEST_RMSE} %, test inputs not stated", _floor, commands.best),
+    Claim("polynomials beat thin-plate splines", "said, without a figure", _splines, commands.splines),
+    Claim("orders 6 and 7 are best", "6 and 7", _best, commands.orders),
+    Claim("larger bases get worse", "grows exponentially", _larger, commands.textbook),
+    Claim("small training forces beat large ones", "±1 to ±100 N chosen", _forces, commands.forces),
+    Claim("the yaw rate is tracked without error", "without error", _yaw, commands.yaw),
 )

@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Iterable, Sequence
+from itertools import product
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
 from koopcli.records import Meta
 from koopcli.reproduction import edmd_cells as blocks
 from koopcli.reproduction import headlines
-from koopcli.reproduction.claims import claims_table, scores
-from koopcli.reproduction.edmd_cells import cells
-from koopcli.reproduction.report import (
-    REDUCED,
-    Method,
-    Picture,
-    Run,
-    Table,
-    count_text,
-    drawer,
-    has_effect,
-    score_text,
-)
+from koopcli.reproduction.claims import claims_table
+from koopcli.reproduction.edmd_cells import Edmd, Training
+from koopcli.reproduction.layout import crossed
+from koopcli.reproduction.report import REDUCED, Method, Picture, Run, Table, drawer
+from koopcli.reproduction.texts import count_text, score_text
 from koopcli.simulation.samples.box import BoxSample
 from koopcli.simulation.samples.grid import GridSample
-from koopcli.simulation.samples.sample import INPUTS
-from koopcli.stages import grid
+from koopcli.simulation.samples.sample import INPUTS, Excitation
+from koopcli.stages import grid, verdict
+from koopcli.stages.base import Task
 
 NOTES = (
     "The paper does not state the test inputs behind its {paper} %, so three kinds are scored: none, ±{amplitude} N "
@@ -48,74 +41,70 @@ NOTES = (
 
 def pictures(experiment: Experiment) -> list[Picture]:
     """The vehicle, errors against order, and one predictor in detail: the draw, order and inputs the paper states."""
-    plan, excitation = experiment.reproduce, blocks.excitation(experiment)
-    everywhere = blocks.trainings(experiment)
-    every = list(cells(experiment))
-    sweep = [(cell, task) for cell, task in every if cell.block == blocks.SWEEP]
-    first = everywhere[0].name
-    chosen = {c: t for c, t in sweep if (c.draw, c.excitation) == (first, excitation)}
+    edmd, plan, draw = Edmd(experiment), experiment.reproduce, drawer(experiment)
+    each_draw = [training for training in edmd.trainings if training.seed == plan.draw_seeds[0]]
     orders = [order for order in plan.orders if order <= BEST_ORDERS[-1]] or list(plan.orders)
-    one = next(task for cell, task in chosen.items() if cell.order == orders[-1])
-    some = [task for cell, task in chosen.items() if cell.order in orders and cell.order % 2 == orders[-1] % 2]
-    kinds = {training.draw: training.name for training in reversed(everywhere)}.values()
-    draw = drawer(experiment)
-    data = f"{first} draw, {INPUTS[excitation]}"
+    by_order = {order: edmd.evaluated(edmd.first, fit) for order, fit in edmd.polynomials.items()}
+    last = by_order[orders[-1]]
+    inputs = INPUTS[edmd.inputs]
+    data = f"{edmd.first.name} draw, {inputs}"
     about = f"order {orders[-1]}, {data}"
-    restart = experiment.plot.restart
-    found = [
+
+    def swept(trainings: Iterable[Training], *kinds: Excitation) -> list[Task]:
+        sweep = product(trainings, edmd.polynomials.values(), kinds)
+        return [edmd.evaluated(training, fit, kind) for training, fit, kind in sweep]
+
+    fits = (edmd.best, edmd.splines, edmd.bilinear, edmd.generator)
+    compared = [edmd.evaluated(edmd.first, fit) for fit in fits]
+    linearised = verdict.beside(experiment, compared[0])["linearisation"]
+    pictured = [
         Picture(draw("single-track", []), "The single-track vehicle; signs are those of ISO 8855."),
         Picture(
-            draw("orders", list(chosen.values())),
+            draw("orders", list(by_order.values())),
             f"Error against the order of the basis ({data}). The paper's two best points are marked; it does "
             "not state the test inputs.",
         ),
         Picture(
-            draw("orders", [task for cell, task in sweep if cell.draw in kinds]),
+            draw("orders", swept(each_draw, *plan.excitations)),
             "Mean errors for every kind of test inputs: inputs, not the basis, set the floor.",
             leads=True,
         ),
+        Picture(draw("orders", swept(edmd.trainings, edmd.inputs)), f"Mean errors for every training draw ({inputs})."),
+    ]
+    if "random" in plan.draws:
+        all_draws = f"Error against the order over all random training draws ({inputs})."
+        pictured.append(Picture(draw("sweep", [grid.order_grid(experiment, excitation=edmd.inputs)]), all_draws))
+    pictured += [
         Picture(
-            draw("orders", [task for cell, task in sweep if cell.excitation == excitation]),
-            f"Mean errors for every training draw ({INPUTS[excitation]}).",
-        ),
-        *(
-            [
-                Picture(
-                    draw("sweep", [grid.order_grid(experiment, excitation=excitation)]),
-                    f"Error against the order over all random training draws ({INPUTS[excitation]}).",
-                )
-            ]
-            if "random" in plan.draws
-            else []
-        ),
-        Picture(
-            draw("horizon", blocks.compared(experiment)),
+            draw("horizon", [*compared, linearised]),
             f"Median error against time of what breaks the floor, beside the linear predictor ({data}).",
         ),
         Picture(
-            draw("random-input", [one.input("predictor")]),
-            f"One trajectory under random inputs, predicted by order {orders[-1]} and started afresh every {restart} "
-            "samples. The paper finds the yaw rate tracked without error.",
+            draw("random-input", [last.input("predictor")]),
+            f"One trajectory under random inputs, predicted by order {orders[-1]} and started afresh every "
+            f"{experiment.plot.restart} samples. The paper finds the yaw rate tracked without error.",
         ),
-        Picture(draw("rmse-histogram", [one]), f"How the errors are distributed ({about})."),
-        Picture(draw("horizon", some), f"Median error against time, by order ({data})."),
-        Picture(draw("density", [one]), f"Error against the distance of the initial state to the data ({about})."),
+        Picture(draw("rmse-histogram", [last]), f"How the errors are distributed ({about})."),
         Picture(
-            draw("spectrum", [one.input("predictor")]),
-            f"Eigenvalues of the lifted system, order {orders[-1]}.",
+            draw("horizon", [by_order[order] for order in orders if order % 2 == orders[-1] % 2]),
+            f"Median error against time, by order ({data}).",
         ),
+        Picture(draw("density", [last]), f"Error against the distance of the initial state to the data ({about})."),
+        Picture(draw("spectrum", [last.input("predictor")]), f"Eigenvalues of the lifted system, order {orders[-1]}."),
     ]
-    many = [task for cell, task in every if cell.block == blocks.DRAWS]
-    if many:
-        found.append(Picture(draw("best-order", many), f"The best order over random draws ({INPUTS[excitation]})."))
-    return found
+    if edmd.many:
+        pictured.append(
+            Picture(draw("best-order", swept(edmd.many, edmd.inputs)), f"The best order over random draws ({inputs}).")
+        )
+    return pictured
 
 
 def notes(runs: Sequence[Run]) -> list[str]:
     """What the tables mean, beginning with a word on runs of another size than the paper's."""
+    experiments = [Edmd(run.experiment) for run in runs]
     full = (_samples(GridSample()), _tests(BoxSample()))
-    sizes = {(_samples(blocks.grid(run.experiment)), _tests(blocks.box(run.experiment))) for run in runs}
-    amplitudes = dict.fromkeys(f"{blocks.box(run.experiment).amplitude:g}" for run in runs)
+    sizes = {(_samples(edmd.grid), _tests(edmd.box)) for edmd in experiments}
+    amplitudes = dict.fromkeys(f"{edmd.box.amplitude:g}" for edmd in experiments)
     said = [note.format(paper=BEST_RMSE, amplitude=" or ".join(amplitudes)) for note in NOTES]
     return said if sizes == {full} else [REDUCED, *said]
 
@@ -127,65 +116,60 @@ def tables(runs: Sequence[Run]) -> list[Table]:
 
 def paper_table(runs: Sequence[Run]) -> Table:
     """The paper's numbers beside each run's."""
-    plan = runs[0].experiment.reproduce
-    draw = blocks.trainings(runs[0].experiment)[0].name
+    experiments = [Edmd(run.experiment) for run in runs]
+    plan, first = runs[0].experiment.reproduce, experiments[0].first
     rows = [
         [
             "training samples, 4·15^4 in the paper",
             _samples(GridSample()),
-            *(_samples(blocks.grid(run.experiment)) for run in runs),
+            *(_samples(edmd.grid) for edmd in experiments),
             "",
         ],
-        ["test trajectories × steps", _tests(BoxSample()), *(_tests(blocks.box(run.experiment)) for run in runs), ""],
+        ["test trajectories × steps", _tests(BoxSample()), *(_tests(edmd.box) for edmd in experiments), ""],
     ]
-    for excitation in plan.excitations:
-        for order in BEST_ORDERS:
-            if order in plan.orders:
-                label = f"RMSE, order {order}, {INPUTS[excitation]}"
-                found = [score_text(figures(run, draw, order, excitation)) for run in runs]
-                rows.append([label, f"{BEST_RMSE}", *found, "%"])
-    title = f"EDMD: paper versus here ({draw} draw), RMSE as mean ± std (median)"
+    for kind, order in product(plan.excitations, BEST_ORDERS):
+        if order in plan.orders:
+            scores = [score_text(_swept(run, first, order, kind)) for run in runs]
+            rows.append([f"RMSE, order {order}, {INPUTS[kind]}", f"{BEST_RMSE}", *scores, "%"])
+    title = f"EDMD: paper versus here ({first.name} draw), RMSE as mean ± std (median)"
     return Table(title, ["", "paper", *(run.label for run in runs), "unit"], rows)
 
 
 def beside_table(runs: Sequence[Run]) -> Table:
     """Other bases, bilinear terms, baselines, and assumptions that the paper leaves open."""
-    plan, rows = runs[0].experiment.reproduce, []
-    shown = (s.cell for s in runs[0].scored if s.cell.block not in (blocks.SWEEP, blocks.DRAWS))
-    for block, label, draw, order in dict.fromkeys((c.block, c.label, c.draw, c.order) for c in shown):
-        for i, run in enumerate(runs):
-            found = {cell.excitation: score for cell, score in scores(run, block, label=label, draw=draw, order=order)}
-            special = f"{label}, order {order}" if block == blocks.TEXTBOOK else label
-            functions = next((score["functions"] for score in found.values()), 0)
-            counted = f"{special} ({functions})" if functions else special
-            name = [block, counted] if i == 0 else ["", f"  {run.label}"]
-            rows.append([*name, draw, *(score_text(found.get(e)) for e in plan.excitations)])
-    header = ["", "predictor (N)", "training draw", *(INPUTS[e] for e in plan.excitations)]
+    kinds, rows = runs[0].experiment.reproduce.excitations, []
+    lines = [crossed(run, ("block", "label", "draw", "order"), "excitation", *blocks.BESIDE) for run in runs]
+    for key, here in lines[0].items():
+        block, label, draw, order = key
+        special = f"{label}, order {order}" if block == blocks.TEXTBOOK else label
+        functions = next(iter(here.values())).figures["functions"]
+        names = [block, f"{special} ({functions})" if functions else special]
+        for run, line in zip(runs, lines, strict=True):
+            scores = {kind: scored.figures for kind, scored in line.get(key, {}).items()}
+            named = names if run is runs[0] else ["", f"  {run.label}"]
+            rows.append([*named, draw, *(score_text(scores.get(kind)) for kind in kinds)])
+    header = ["", "predictor (N)", "training draw", *(INPUTS[kind] for kind in kinds)]
     title = "Beside the polynomials: RMSE in %, mean ± std (median), with N functions"
     return Table(title, header, rows, left=3)
 
 
 def order_tables(runs: Sequence[Run]) -> list[Table]:
     """For each draw, a row for each order: mean ± std (median) in percent for each kind of test inputs."""
-    plan = runs[0].experiment.reproduce
-    found = []
-    for training in blocks.trainings(runs[0].experiment):
+    plan, tables = runs[0].experiment.reproduce, []
+    for training in Edmd(runs[0].experiment).trainings:
         rows = []
-        for order in plan.orders:
-            for i, run in enumerate(runs):
-                there = [figures(run, training.name, order, excitation) for excitation in plan.excitations]
-                functions = next((str(score["functions"]) for score in there if score is not None), "–")
-                name = f"{order} ({functions})" if i == 0 else f"  {run.label}"
-                rows.append([name, *map(score_text, there)])
+        for order, run in product(plan.orders, runs):
+            scores = [_swept(run, training, order, kind) for kind in plan.excitations]
+            name = f"{order} ({scores[0]['functions']})" if run is runs[0] else f"  {run.label}"
+            rows.append([name, *map(score_text, scores)])
         title = f"RMSE in %, mean ± std (median), with N functions, {training.name} draw"
-        found.append(Table(title, ["order (N)", *(INPUTS[e] for e in plan.excitations)], rows))
-    return found
+        tables.append(Table(title, ["order (N)", *(INPUTS[kind] for kind in plan.excitations)], rows))
+    return tables
 
 
-def figures(run: Run, draw: str, order: int, excitation: str) -> Meta | None:
-    """The numbers of a cell of the sweep, if the run has it."""
-    found = scores(run, blocks.SWEEP, draw=draw, order=order, excitation=excitation)
-    return found[0][1] if found else None
+def _swept(run: Run, training: Training, order: int, kind: Excitation) -> Meta:
+    edmd = Edmd(run.experiment)
+    return run.figures(edmd.evaluated(training, edmd.with_order(order), kind))
 
 
 def _samples(sample: GridSample) -> str:
@@ -199,7 +183,7 @@ def _tests(test: BoxSample) -> str:
 METHOD = Method(
     name="edmd",
     title="EDMD",
-    cells=cells,
+    cells=blocks.cells,
     tables=tables,
     notes=notes,
     pictures=pictures,
@@ -213,20 +197,4 @@ METHOD = Method(
         "test.excitation": 'reproduce.excitations=["held"]',
         "test.box.excitation": 'reproduce.excitations=["held"]',
     },
-    uses=partial(
-        has_effect,
-        plant="forces",
-        swept=("orders", "draws", "draw_seeds", "training_forces", "full", "full_draws", "excitations"),
-        foreign=(
-            "fit-eigen",
-            "baseline",
-            "sample.box",
-            "sample.point",
-            "sample.ellipsoid",
-            "sample.greedy",
-            "sample.ball",
-            "test.ball",
-        ),
-    ),
-    reads=("fit-edmd.centres", "fit-edmd.placement", "fit-edmd.seed"),
 )

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from typing import Literal
 
 from koopcli.config.experiment import Experiment
 from koopcli.config.paper import BEST_ORDERS
@@ -28,6 +31,7 @@ SWEEP, OTHERS, BASELINES, FORCES, PER_WHEEL, TEST_GRID, TEXTBOOK, DRAWN, DRAWS =
     "random inputs",
     "more draws",
 )
+BESIDE = (OTHERS, BASELINES, FORCES, PER_WHEEL, TEST_GRID, TEXTBOOK, DRAWN)  # all but sweeps
 BILINEAR_ORDER = 8  # of the yaw rate, beside degree 1 of the velocity: 27 functions
 TEXTBOOK_ORDERS = (5, 6, 7)  # where the normal equations of monomials end
 RESTART = 50  # samples, as in the paper's figure
@@ -47,183 +51,196 @@ class Cell:
 
 @dataclass(frozen=True)
 class Training:
-    """A training grid by its draw, and what it is called."""
+    """A training grid by its draw; ``force``: all its inputs are of this size in N, and as many."""
 
-    draw: str
+    draw: Literal["random", "even", "chebyshev"]
     seed: int
+    force: float | None = None
 
     @property
     def name(self) -> str:
         """Its draw, with the seed where there is one to tell."""
         return f"{self.draw} {self.seed}" if self.draw == "random" else self.draw
 
-
-def trainings(experiment: Experiment) -> list[Training]:
-    """Every training grid of the sweep: each random one, and one of each other kind."""
-    plan = experiment.reproduce
-    found = []
-    for draw in plan.draws:
-        seeds = plan.draw_seeds if draw == "random" else plan.draw_seeds[:1]
-        found += [Training(draw, seed) for seed in seeds]
-    return found
+    def of(self, own: GridSample) -> GridSample:
+        """The sample, where the experiment's ``own`` has everything else."""
+        sample = replace(own, draw=self.draw, seed=self.seed)
+        if self.force is None:
+            return sample
+        return replace(sample, levels=(self.force,), columns=len(own.levels) * own.columns)
 
 
-def excitation(experiment: Experiment) -> Excitation:
-    """The test inputs that claims are judged by: the kind the paper states, if it is swept."""
-    plan = experiment.reproduce
-    return "fresh" if "fresh" in plan.excitations else plan.excitations[0]
+@dataclass(frozen=True)
+class Edmd:
+    """What an ``experiment`` has of the method: its training grids, its fits, and the evaluations of both."""
 
+    experiment: Experiment
 
-def best_order(experiment: Experiment) -> int:
-    """The order that stands for polynomial bases: the paper's best, or the nearest below that is swept."""
-    orders = experiment.reproduce.orders
-    return max((order for order in orders if order <= BEST_ORDERS[-1]), default=orders[0])
+    @cached_property
+    def trainings(self) -> list[Training]:
+        """Every training grid of the sweep: each random one, and one of each other kind."""
+        plan = self.experiment.reproduce
+        seeds = {draw: plan.draw_seeds if draw == "random" else plan.draw_seeds[:1] for draw in plan.draws}
+        return [Training(draw, seed) for draw in plan.draws for seed in seeds[draw]]
+
+    @property
+    def first(self) -> Training:
+        """The training grid of everything that is fitted on one alone."""
+        return self.trainings[0]
+
+    @property
+    def both(self) -> list[Training]:
+        """The training grids that other bases are fitted to as well: a random one and another, by default."""
+        return list(dict.fromkeys((self.trainings[0], self.trainings[-1])))
+
+    @property
+    def many(self) -> list[Training]:
+        """The many random training grids of a full run."""
+        plan = self.experiment.reproduce
+        return [Training("random", seed) for seed in range(plan.full_draws)] if plan.full else []
+
+    @property
+    def inputs(self) -> Excitation:
+        """The test inputs that claims are judged by: the kind the paper states, if it is swept."""
+        kinds = self.experiment.reproduce.excitations
+        return "fresh" if "fresh" in kinds else kinds[0]
+
+    @property
+    def order(self) -> int:
+        """The order that stands for polynomial bases: the paper's best, or the nearest below that is swept."""
+        orders = self.experiment.reproduce.orders
+        return max((order for order in orders if order <= BEST_ORDERS[-1]), default=orders[0])
+
+    @property
+    def polynomials(self) -> dict[int, FitEdmd]:
+        """The experiment's fit with every order of the sweep."""
+        return {order: self.with_order(order) for order in self.experiment.reproduce.orders}
+
+    @property
+    def best(self) -> FitEdmd:
+        """The fit that stands for polynomial bases."""
+        return self.with_order(self.order)
+
+    @property
+    def bilinear(self) -> FitEdmd:
+        """Bilinear terms on a constant and a linear velocity times powers of the yaw rate."""
+        return FitEdmd.of(basis="anisotropic", order=min(BILINEAR_ORDER, self.grid.count - 1), terms="bilinear")
+
+    @property
+    def generator(self) -> FitEdmd:
+        """The same in continuous time."""
+        return self.bilinear.but(terms="generator")
+
+    @property
+    def splines(self) -> FitEdmd:
+        """Thin-plate splines, with the experiment's centres."""
+        return FitEdmd(self.experiment.fit("fit-edmd", basis=SPLINES).basis)
+
+    @property
+    def textbook(self) -> dict[int, FitEdmd]:
+        """The textbook's regression, of those of its orders that are swept."""
+        orders = [order for order in TEXTBOOK_ORDERS if order in self.experiment.reproduce.orders]
+        return {order: FitEdmd.of(order=order, solver="cholesky-monomials") for order in orders}
+
+    def with_order(self, order: int) -> FitEdmd:
+        """The experiment's fit with an order."""
+        return recipes.with_order(self.experiment, order).fit_edmd
+
+    def trained(self, training: Training, fit: FitEdmd) -> Task:
+        """The predictor of a fit on a training grid."""
+        trajectories = recipes.simulation(self.experiment, recipes.sample(training.of(self.grid)))
+        return recipes.fit_edmd(replace(self.experiment, fit_edmd=fit), trajectories)
+
+    def evaluated(self, training: Training, fit: FitEdmd, kind: Excitation | None = None, **tested: object) -> Task:
+        """Its evaluation under a kind of test inputs, those that claims are judged by if none are said; ``tested``:
+        settings of the test sample to replace.
+        """
+        predictor = self.trained(training, fit)
+        plant = predictor.ancestor("simulate").settings
+        test = recipes.test_set(self.experiment, plant, excitation=kind or self.inputs, **tested)
+        return recipes.evaluation(self.experiment, predictor, test)
+
+    @property
+    def grid(self) -> GridSample:
+        """The training sample. Raises ``InvalidValueError`` for another kind."""
+        sample = self.experiment.sample("grid")
+        if not isinstance(sample, GridSample):
+            raise InvalidValueError("reproduce edmd trains on a grid: sample.kind must be 'grid'")
+        return sample
+
+    @property
+    def box(self) -> BoxSample:
+        """The test states. Raises ``InvalidValueError`` for another kind."""
+        sample = self.experiment.test("box", self.experiment.vehicle)
+        if not isinstance(sample, BoxSample):
+            raise InvalidValueError("reproduce edmd tests on states in a box: test.kind must be 'box'")
+        return sample
 
 
 def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
     """Every cell of the experiment with its evaluation."""
-    plan = experiment.reproduce
     basis = experiment.fit_edmd.basis
     if not hasattr(basis, "order"):
         raise InvalidValueError(
             f"reproduce edmd sweeps orders, which the basis '{basis.kind}' has none of: leave it out"
         )
-    for training in trainings(experiment):
-        for order in plan.orders:
-            yield from _scored(experiment, SWEEP, "", training, recipes.with_order(experiment, order).fit_edmd)
-    yield from _others(experiment)
-    yield from _forces(experiment)
-    yield from _settings(experiment)
-    if plan.full:
-        draws = [Training("random", seed) for seed in range(plan.full_draws)]
-        for training in draws:
-            for order in plan.orders:
-                fit = recipes.with_order(experiment, order).fit_edmd
-                yield from _scored(experiment, DRAWS, "", training, fit, (excitation(experiment),))
+    edmd = Edmd(experiment)
+    for training, fit in product(edmd.trainings, edmd.polynomials.values()):
+        yield from _row(edmd, SWEEP, "", training, fit)
+    yield from _others(edmd)
+    yield from _settings(edmd)
+    for training, fit in product(edmd.many, edmd.polynomials.values()):
+        yield from _row(edmd, DRAWS, "", training, fit, [edmd.inputs])
 
 
-def bilinear(experiment: Experiment, terms: str) -> FitEdmd:
-    """Bilinear terms on a constant and a linear velocity times powers of the yaw rate."""
-    order = min(BILINEAR_ORDER, grid(experiment).count - 1)
-    return FitEdmd.of(basis="anisotropic", order=order, terms=terms)
+def _others(edmd: Edmd) -> Iterator[tuple[Cell, Task]]:
+    """Splines, bilinear terms and baselines, and the best order trained with forces of one size, beside one bilinear
+    row, whose regression needs them no smaller.
+    """
+    plan, first = edmd.experiment.reproduce, edmd.first
+    for training, fit in product(edmd.both, (edmd.splines, edmd.bilinear, edmd.generator)):
+        yield from _row(edmd, OTHERS, "{name}", training, fit)
+    for kind in plan.excitations:
+        own = edmd.evaluated(first, edmd.experiment.fit_edmd, kind)
+        for name, task in verdict.beside(edmd.experiment, own).items():
+            yield Cell(BASELINES, verdict.NAMES[name], first.name, None, kind), task
+    for force, fit in product(plan.training_forces, (edmd.best, edmd.bilinear)):
+        yield from _row(edmd, FORCES, f"{{name}}, ±{force:g} N", replace(first, force=force), fit)
 
 
-def splines(experiment: Experiment) -> FitEdmd:
-    """Thin-plate splines, with the experiment's centres."""
-    return FitEdmd(experiment.fit("fit-edmd", basis=SPLINES).basis)
-
-
-def compared(experiment: Experiment) -> list[Task]:
-    """Evaluations on one test set: the best order, what is set beside it, and the linearised plant."""
-    first = trainings(experiment)[0]
-    data = training_set(experiment, first)
-    fits = [
-        recipes.with_order(experiment, best_order(experiment)).fit_edmd,
-        splines(experiment),
-        bilinear(experiment, "bilinear"),
-        bilinear(experiment, "generator"),
-    ]
-    predictors = [recipes.fit_edmd(replace(experiment, fit_edmd=fit), data) for fit in fits]
-    tasks = [_evaluated(experiment, predictor, excitation(experiment)) for predictor in predictors]
-    return [*tasks, verdict.beside(experiment, tasks[0])["linearisation"]]
-
-
-def _others(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
-    """Splines, bilinear terms and baselines, on a random and on another training grid."""
-    everywhere = trainings(experiment)
-    for training in dict.fromkeys((everywhere[0], everywhere[-1])):
-        for fit in (splines(experiment), bilinear(experiment, "bilinear"), bilinear(experiment, "generator")):
-            yield from _scored(experiment, OTHERS, None, training, fit)
-    first = everywhere[0]
-    for cell, task in _scored(experiment, SWEEP, "", first, experiment.fit_edmd):
-        for name, other in verdict.beside(experiment, task).items():
-            yield Cell(BASELINES, verdict.NAMES[name], first.name, None, cell.excitation), other
-
-
-def _forces(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
-    """The best order trained with forces of one size, and one bilinear row, whose regression needs them no smaller."""
-    first, sample = trainings(experiment)[0], grid(experiment)
-    columns = len(sample.levels) * sample.columns
-    best = recipes.with_order(experiment, best_order(experiment)).fit_edmd
-    for level in experiment.reproduce.training_forces:
-        for fit in (best, bilinear(experiment, "bilinear")):
-            label = f"{outlook_name(experiment, fit)}, ±{level:g} N"
-            yield from _scored(experiment, FORCES, label, first, fit, levels=(level,), columns=columns)
-
-
-def _settings(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
+def _settings(edmd: Edmd) -> Iterator[tuple[Cell, Task]]:
     """Assumptions the paper leaves open, and how the textbook's regression fares."""
-    first = trainings(experiment)[0]
-    best = recipes.with_order(experiment, best_order(experiment)).fit_edmd
-    plant = experiment.plant_for(Forces)
-    assert isinstance(plant, Forces)
-    other = Forces("axle" if plant.force_per == "wheel" else "wheel")
-    elsewhere = replace(experiment, simulate=replace(experiment.simulate, plant=other))
-    yield from _scored(elsewhere, PER_WHEEL, f"force per {other.force_per}", first, best)
-    data = training_set(experiment, first)
-    predictor = recipes.fit_edmd(replace(experiment, fit_edmd=best), data)
-    side = round(box(experiment).count ** (1 / 3))
-    for kind in experiment.reproduce.excitations:
-        task = _evaluated(experiment, predictor, kind, layout="product", count=side**3)
-        yield Cell(TEST_GRID, f"{side}³ test states on a grid", first.name, _order(best), kind), task
-    for order in (order for order in TEXTBOOK_ORDERS if order in experiment.reproduce.orders):
-        fit = FitEdmd.of(order=order, solver="cholesky-monomials")
-        yield from _scored(experiment, TEXTBOOK, "cholesky-monomials", first, fit, (excitation(experiment),))
+    experiment, first = edmd.experiment, edmd.first
+    other = Forces("axle" if experiment.plant_for(Forces) == Forces("wheel") else "wheel")
+    elsewhere = Edmd(replace(experiment, simulate=replace(experiment.simulate, plant=other)))
+    yield from _row(elsewhere, PER_WHEEL, f"force per {other.force_per}", first, edmd.best)
+    side = round(edmd.box.count ** (1 / 3))
+    label = f"{side}³ test states on a grid"
+    yield from _row(edmd, TEST_GRID, label, first, edmd.best, layout="product", count=side**3)
+    for fit in edmd.textbook.values():
+        yield from _row(edmd, TEXTBOOK, "cholesky-monomials", first, fit, [edmd.inputs])
     restarting = replace(experiment, evaluate=replace(experiment.evaluate, restart=RESTART))
-    for fit in (best, bilinear(experiment, "bilinear"), bilinear(experiment, "generator")):
-        predictor = recipes.fit_edmd(replace(experiment, fit_edmd=fit), data)
-        task = recipes.evaluation(restarting, predictor)
-        label = f"{outlook(predictor).name}, restart every {RESTART}"
-        yield Cell(DRAWN, label, first.name, _order(fit), "fresh"), task
+    for fit in (edmd.best, edmd.bilinear, edmd.generator):
+        predictor = edmd.trained(first, fit)
+        cell = _cell(DRAWN, f"{{name}}, restart every {RESTART}", first, predictor, "fresh")
+        yield cell, recipes.evaluation(restarting, predictor)
 
 
-def outlook_name(experiment: Experiment, fit: FitEdmd) -> str:
-    """What the predictor of a fit is called."""
-    return outlook(recipes.fit_edmd(replace(experiment, fit_edmd=fit))).name
-
-
-def _scored(
-    experiment: Experiment,
+def _row(
+    edmd: Edmd,
     block: str,
-    label: str | None,
+    label: str,
     training: Training,
     fit: FitEdmd,
-    excitations: tuple[Excitation, ...] = (),
-    **changed: object,
+    kinds: Sequence[Excitation] = (),
+    **tested: object,
 ) -> Iterator[tuple[Cell, Task]]:
-    """One fit under each kind of test inputs; its own name is the label where there is none."""
-    predictor = recipes.fit_edmd(replace(experiment, fit_edmd=fit), training_set(experiment, training, **changed))
-    named = outlook(predictor).name if label is None else label
-    for kind in excitations or experiment.reproduce.excitations:
-        yield Cell(block, named, training.name, _order(fit), kind), _evaluated(experiment, predictor, kind)
+    """One fit under each kind of test inputs; ``{name}`` in its label is what it is called."""
+    for kind in kinds or edmd.experiment.reproduce.excitations:
+        task = edmd.evaluated(training, fit, kind, **tested)
+        yield _cell(block, label, training, task.input("predictor"), kind), task
 
 
-def _order(fit: FitEdmd) -> int | None:
-    return getattr(fit.basis, "order", None)
-
-
-def training_set(experiment: Experiment, training: Training, **changed: object) -> Task:
-    """The trajectories of a training grid, with settings of its sample ``changed``."""
-    sample = replace(grid(experiment), draw=training.draw, seed=training.seed, **changed)  # type: ignore[arg-type]
-    return recipes.simulation(experiment, recipes.sample(sample))
-
-
-def _evaluated(experiment: Experiment, predictor: Task, kind: Excitation, **changed: object) -> Task:
-    plant = predictor.ancestor("simulate").settings
-    return recipes.evaluation(experiment, predictor, recipes.test_set(experiment, plant, excitation=kind, **changed))
-
-
-def grid(experiment: Experiment) -> GridSample:
-    """The training sample. Raises ``InvalidValueError`` for another kind."""
-    found = experiment.sample("grid")
-    if not isinstance(found, GridSample):
-        raise InvalidValueError("reproduce edmd trains on a grid: sample.kind must be 'grid'")
-    return found
-
-
-def box(experiment: Experiment) -> BoxSample:
-    """The test states. Raises ``InvalidValueError`` for another kind."""
-    found = experiment.test("box", experiment.vehicle)
-    if not isinstance(found, BoxSample):
-        raise InvalidValueError("reproduce edmd tests on states in a box: test.kind must be 'box'")
-    return found
+def _cell(block: str, label: str, training: Training, predictor: Task, kind: Excitation) -> Cell:
+    about = outlook(predictor)
+    return Cell(block, label.format(name=about.name), training.name, about.order, kind)

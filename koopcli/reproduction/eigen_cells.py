@@ -37,66 +37,79 @@ class Cell:
 
 def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
     """Every cell of the experiment with its evaluation."""
-    plan, main = experiment.reproduce, experiment.vehicle_name
+    plan, everywhere = experiment.reproduce, recipes.vehicles(experiment)
     first = plan.seeds[0]
-    everywhere = recipes.vehicles(experiment)
-    as_given = experiment.fit_eigen
-    splines = FitEigen.of(tabulate=as_given.tabulate)  # a row means what it says, whatever the experiment changes
-    optimal = splines.but(boundary="optimal")
-
-    for (vehicle, there), seed in product(everywhere, plan.seeds):
-        yield Cell(HEADLINE, "as the experiment says", vehicle, seed), evaluated(there, as_given, seed)
-    for centres in CENTRES:
-        fit = splines.but(centres=centres, scaling="extent")
-        yield Cell(READINGS, f"thin-plate, {centres} centres, scaled", main, first), evaluated(experiment, fit, first)
-    for cut in (None, CUT):
-        fit = splines.but(centres=FEW_CENTRES, **({} if cut is None else {"cut": cut}))
-        yield (
-            Cell(READINGS, f"thin-plate, {FEW_CENTRES} centres{cut_text(cut)}", main, first),
-            evaluated(experiment, fit, first),
-        )
-    for cut in (None, CUT):
-        fit = optimal.but(cut=cut)
-        for (vehicle, there), seed in product(everywhere, plan.seeds):
-            yield Cell(READINGS, f"optimal{cut_text(cut)}", vehicle, seed), evaluated(there, fit, seed)
-        for degree in (1, 3):
-            label = f"optimal{cut_text(cut)}, sums of up to {degree}"
-            yield Cell(READINGS, label, main, first), evaluated(experiment, fit.but(degree=degree), first)
-        literal = replace(fit, tabulate=LITERAL_TABLE)
-        label = f"optimal{cut_text(cut)}, {LITERAL_STEPS:g} s simulated, {LITERAL_TABLE:g} s tabulated"
-        yield Cell(READINGS, label, main, first), evaluated(experiment, literal, first, seconds=LITERAL_STEPS)
-    peaked = _with_peak(experiment)
-    label = f"optimal{cut_text(CUT)}, D = {PEAK:g} N"
-    yield Cell(READINGS, label, main, first), evaluated(peaked, optimal.but(cut=CUT), first)
-    for fit, cut in product((splines, optimal), plan.cuts):
+    for (vehicle, own), seed in product(everywhere, plan.seeds):
+        yield Cell(HEADLINE, "as the experiment says", vehicle, seed), headline(own, seed)
+    yield from _readings(experiment)
+    for fit, cut in product((splines(experiment), optimal(experiment, None)), plan.cuts):
         label = f"{written(fit)['boundary']}, cut {cut:g}"
-        yield Cell(CUTS, label, main, first), evaluated(experiment, fit.but(cut=cut), first)
-    for vehicle, there in everywhere:
+        task = evaluated(experiment, fit.but(cut=cut), first)
+        yield Cell(CUTS, label, experiment.vehicle_name, first), task
+    for vehicle, own in everywhere:
         for scale in plan.mu_scales:
-            gripping = there.with_parameters(mu_scale=scale * there.vehicle.mu_scale)
-            yield Cell(GRIP, f"grip × {scale:g}", vehicle, first), evaluated(gripping, as_given, first)
-            label, fit = f"grip × {scale:g}, optimal{cut_text(CUT)}", optimal.but(cut=CUT)
-            yield Cell(GRIP, label, vehicle, first), evaluated(gripping, fit, first)
-        for predictor in recipes.beside(there, _training(there)):
-            yield Cell(BASELINES, outlook(predictor).name, vehicle, first), _scored(there, predictor, first)
+            label, gripping = f"grip × {scale:g}", own.with_parameters(mu_scale=scale * own.vehicle.mu_scale)
+            yield Cell(GRIP, label, vehicle, first), headline(gripping, first)
+            task = evaluated(gripping, optimal(experiment, CUT), first)
+            yield Cell(GRIP, f"{label}, optimal{cut_text(CUT)}", vehicle, first), task
+        for task in beside(own, first):
+            yield Cell(BASELINES, outlook(task.input("predictor")).name, vehicle, first), task
 
 
-def evaluated(experiment: Experiment, fit: FitEigen, seed: int, seconds: float | None = None) -> Task:
-    """The evaluation of one fit on the test states of a seed, its trajectories as long as the experiment says."""
-    simulate = experiment.simulate
-    if seconds is not None:
-        simulate = replace(simulate, steps=max(1, round(seconds / simulate.dt)))
-    there = replace(experiment, fit_eigen=fit, simulate=simulate)
-    return _scored(there, recipes.fit_eigen(there, _training(there)), seed)
+def _readings(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
+    """Other readings of the paper's text."""
+    seeds, main = experiment.reproduce.seeds, experiment.vehicle_name
+
+    def row(label: str, fit: FitEigen, of: Experiment = experiment) -> tuple[Cell, Task]:
+        return Cell(READINGS, label, main, seeds[0]), evaluated(of, fit, seeds[0])
+
+    plain = splines(experiment)
+    for centres in CENTRES:
+        yield row(f"thin-plate, {centres} centres, scaled", plain.but(centres=centres, scaling="extent"))
+    for cut in (None, CUT):
+        label = f"thin-plate, {FEW_CENTRES} centres{cut_text(cut)}"
+        yield row(label, plain.but(centres=FEW_CENTRES, **({} if cut is None else {"cut": cut})))
+    for cut in (None, CUT):
+        label, fit = f"optimal{cut_text(cut)}", optimal(experiment, cut)
+        for (vehicle, own), seed in product(recipes.vehicles(experiment), seeds):
+            yield Cell(READINGS, label, vehicle, seed), evaluated(own, fit, seed)
+        for degree in (1, 3):
+            yield row(f"{label}, sums of up to {degree}", fit.but(degree=degree))
+        literal = f"{label}, {LITERAL_STEPS:g} s simulated, {LITERAL_TABLE:g} s tabulated"
+        yield row(literal, fit.but(tabulate=LITERAL_TABLE), _simulating(experiment, LITERAL_STEPS))
+    yield row(f"optimal{cut_text(CUT)}, D = {PEAK:g} N", optimal(experiment, CUT), _with_peak(experiment))
 
 
-def side_by_side(experiment: Experiment, seed: int) -> list[Task]:
-    """Evaluations on the test states of a seed: the experiment's own reading, and what it is set beside."""
-    predictors = recipes.beside(experiment, _training(experiment))
-    return [
-        evaluated(experiment, experiment.fit_eigen, seed),
-        *(_scored(experiment, predictor, seed) for predictor in predictors),
-    ]
+def splines(experiment: Experiment) -> FitEigen:
+    """The paper's reading: a row means what it says, whatever the experiment changes."""
+    return FitEigen.of(tabulate=experiment.fit_eigen.tabulate)
+
+
+def optimal(experiment: Experiment, cut: float | None) -> FitEigen:
+    """The best boundary values there are."""
+    return splines(experiment).but(boundary="optimal", cut=cut)
+
+
+def headline(experiment: Experiment, seed: int) -> Task:
+    """The evaluation of the experiment's own reading on the test states of a seed."""
+    return evaluated(experiment, experiment.fit_eigen, seed)
+
+
+def evaluated(experiment: Experiment, fit: FitEigen, seed: int) -> Task:
+    """The evaluation of one fit on the test states of a seed."""
+    predictor = recipes.fit_eigen(replace(experiment, fit_eigen=fit), _training(experiment))
+    return scored(experiment, predictor, seed)
+
+
+def beside(experiment: Experiment, seed: int) -> list[Task]:
+    """Evaluations of what the experiment's own reading is set beside, the first state held first."""
+    return [scored(experiment, predictor, seed) for predictor in recipes.beside(experiment, _training(experiment))]
+
+
+def scored(experiment: Experiment, predictor: Task, seed: int) -> Task:
+    """The evaluation of a predictor on the test states of a seed."""
+    test = recipes.test_set(experiment, predictor.ancestor("simulate").settings, seed=seed)
+    return recipes.evaluation(experiment, predictor, test)
 
 
 def _training(experiment: Experiment) -> Task:
@@ -104,9 +117,10 @@ def _training(experiment: Experiment) -> Task:
     return recipes.simulation(experiment, plant="slips")
 
 
-def _scored(experiment: Experiment, predictor: Task, seed: int) -> Task:
-    test = recipes.test_set(experiment, predictor.ancestor("simulate").settings, seed=seed)
-    return recipes.evaluation(experiment, predictor, test)
+def _simulating(experiment: Experiment, seconds: float) -> Experiment:
+    """The experiment with trajectories of so many seconds."""
+    simulate = experiment.simulate
+    return replace(experiment, simulate=replace(simulate, steps=max(1, round(seconds / simulate.dt))))
 
 
 def _with_peak(experiment: Experiment) -> Experiment:
@@ -123,15 +137,15 @@ def cut_text(cut: float | None) -> str:
 
 def surface(experiment: Experiment) -> EllipsoidSample:
     """Γ. Raises ``InvalidValueError`` for another kind."""
-    found = experiment.sample("ellipsoid")
-    if not isinstance(found, EllipsoidSample):
+    sample = experiment.sample("ellipsoid")
+    if not isinstance(sample, EllipsoidSample):
         raise InvalidValueError("reproduce eigen starts from an ellipsoid: sample.kind must be 'ellipsoid'")
-    return found
+    return sample
 
 
 def ball(experiment: Experiment) -> BallSample:
     """The test states. Raises ``InvalidValueError`` for another kind."""
-    found = experiment.test("ball", experiment.vehicle)
-    if not isinstance(found, BallSample):
+    sample = experiment.test("ball", experiment.vehicle)
+    if not isinstance(sample, BallSample):
         raise InvalidValueError("reproduce eigen tests on states in a ball: test.kind must be 'ball'")
-    return found
+    return sample

@@ -12,7 +12,7 @@ from koopcli.config.experiment import Experiment
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.eigen.frames import yaw
 from koopcli.records import FloatArray
-from koopcli.reproduction import edmd_cells
+from koopcli.reproduction.edmd_cells import Edmd
 from koopcli.reproduction.report import Race
 from koopcli.simulation.integrate import simulate
 from koopcli.stages.pipeline import Pipeline
@@ -57,7 +57,7 @@ def run(race: Race, experiment: Experiment, pipeline: Pipeline) -> Shown | str:
         if race.evaluation is None:
             assert isinstance(plant, ForceInput), "of the plant that is driven by forces"
             dt = predictors[0].dt
-            x0, u = swerve(plant, edmd_cells.grid(experiment).box, dt)
+            x0, u = swerve(plant, Edmd(experiment).grid.box, dt)
             x = simulate(plant.rhs, x0[np.newaxis], u[np.newaxis], dt, fastest_rate=plant.fastest_rate)[0]
             said = f"one swerve, by axle forces of at most {abs(u).max() / 1e3:.1f} kN"
         else:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from koopcli.config.changes import flat, parse_set
+from koopcli.config.experiment import Experiment
 from koopcli.errors import InvalidValueError, UsageError
 from koopcli.figures.kit.figure import Drawing, FigureKind
 from koopcli.figures.kit.registry import FIGURES
@@ -93,10 +94,13 @@ def command(run: Run, picture: Picture, draws: Sequence[Record]) -> str:
     task, name = picture.task, picture.task.settings.figure
     kind = FIGURES[name]
     words = ["koop", "plot", name]
+
+    def drawn(experiment: Experiment, sources: Sequence[Task] = ()) -> list[Task]:
+        chosen = sources or figure_tasks.artefacts(name, experiment)
+        return [figure_tasks.figure(name, chosen, task.settings.format, experiment)]
+
     try:
-        alone = figure_tasks.figure(
-            name, figure_tasks.artefacts(name, run.experiment), task.settings.format, run.experiment
-        )
+        (alone,) = drawn(run.experiment)
     except (UsageError, InvalidValueError):  # changes that hold for this method's samples and not for the figure's
         alone = None
     told = list(run.changes)
@@ -106,9 +110,10 @@ def command(run: Run, picture: Picture, draws: Sequence[Record]) -> str:
         words += _labels(task, kind)
     if run.base != "paper" and (alone == task or kind.takes == "predictor"):
         words += ["--experiment", run.base]
+    sources = [] if alone == task else [source for role, source in task.inputs if role.endswith("/predictor")]
     for one in told:
         ((setting, _),) = flat(parse_set([one]))
-        if why_idle(setting, run.experiment, [task], kind.uses) is None:
+        if why_idle(setting, run.experiment, lambda experiment: drawn(experiment, sources), [task]) is None:
             words += ["--set", one]
     return shlex.join([*words, "-o", f"{name}.{task.settings.format}"])
 

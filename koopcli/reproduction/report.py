@@ -1,10 +1,15 @@
-"""What a reproduction consists of: a method's cells, their scores, and the tables made of them."""
+"""What a reproduction consists of: a method's cells, their scores, and the tables made of them.
+
+A method yields cells, each with the task of its evaluation (``cells``). A run makes the tasks and keeps their scores.
+Tables lay out a block of cells by the cells' own fields (``layout.py``). Notes, claims, headlines and pictures build
+the task that they speak of and look its score up (``Run.figures``).
+"""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from koopcli.config.experiment import Experiment
@@ -14,12 +19,10 @@ from koopcli.stages import figure_tasks
 from koopcli.stages.base import Task
 from koopcli.stages.pipeline import Pipeline
 from koopcli.store import Record
-from koopcli.vehicles.plants import PLANTS
 
 REDUCED = "This run is not of the paper's size: its numbers cannot be put beside the paper's."
-RASTERS = frozenset({"error-map", "error-side", "energy-surface", "density", "spectrum"})
+RASTERS: frozenset[str] = frozenset({"error-map", "error-side", "energy-surface", "density", "spectrum"})
 # figures of thousands of marks, which are smaller as PNG at the paper's size; all others are smaller as SVG
-SMALLEST, LARGEST = 5, 6  # powers of ten between which numbers are written without one
 
 
 @dataclass(frozen=True)
@@ -37,9 +40,10 @@ class Table:
 
 @dataclass(frozen=True)
 class Scored:
-    """A cell of a method with the numbers of its evaluation and the record that holds them."""
+    """A cell of a method and its ``task``, with the numbers of that evaluation and the record that holds them."""
 
     cell: Any
+    task: Task
     figures: Meta
     record: Record
     measured: Mapping[str, float] = field(default_factory=dict)
@@ -58,6 +62,18 @@ class Run:
     scored: tuple[Scored, ...]
     base: str = "paper"
     changes: tuple[str, ...] = ()
+
+    def figures(self, task: Task) -> Meta:
+        """The numbers of an evaluation of a whole run."""
+        return self._figures[task]
+
+    def known(self, task: Task) -> Meta | None:
+        """The numbers of an evaluation, None where a run that stopped has none."""
+        return self._figures.get(task)
+
+    @cached_property
+    def _figures(self) -> dict[Task, Meta]:
+        return {scored.task: scored.figures for scored in self.scored}
 
 
 @dataclass(frozen=True)
@@ -118,13 +134,9 @@ class Method:
     lead: Lead
     """What of it stands on the first screen."""
     fixed: Mapping[str, str]
-    """Settings that the method sweeps over or fixes, and what to write instead."""
-    uses: Callable[[str], bool]
-    """Whether a setting has an effect on the method."""
+    """Settings that the method sweeps over, and what to write instead."""
     measure: Callable[[Pipeline, Any, Task], Mapping[str, float]] | None = None
     """What is measured of a cell beside its evaluation."""
-    reads: Sequence[str] = ()
-    """Settings of fits that some of its cells have a use for, whatever the experiment's own fit has."""
 
 
 @dataclass(frozen=True)
@@ -155,82 +167,15 @@ def run_cells(plan: Plan, pipeline: Pipeline) -> Run:
             progress(i, len(plan.cells))
             artefact = pipeline.make(task)
             measured = method.measure(pipeline, cell, task) if method.measure is not None else {}
-            scored.append(Scored(cell, artefact.figures, artefact.record, measured))
+            scored.append(Scored(cell, task, artefact.figures, artefact.record, measured))
     return replace(plan.run, scored=tuple(scored))
 
 
 def cells_there(plan: Plan, pipeline: Pipeline) -> Run:
     """The run of a plan with the scores that the store has; nothing is made or measured."""
-    found = ((cell, pipeline.there(task)) for cell, task in plan.cells)
-    scored = (Scored(cell, artefact.figures, artefact.record) for cell, artefact in found if artefact is not None)
+    kept = ((cell, task, pipeline.there(task)) for cell, task in plan.cells)
+    scored = (Scored(cell, task, one.figures, one.record) for cell, task, one in kept if one is not None)
     return replace(plan.run, scored=tuple(scored))
-
-
-def has_effect(name: str, *, plant: str, swept: Sequence[str], foreign: Sequence[str]) -> bool:
-    """Whether the setting ``name`` has an effect on a method with this ``plant``.
-
-    ``swept``: its settings of `reproduce`; ``foreign``: sections and tables that belong to the other methods.
-    """
-    section, _, key = name.partition(".")
-    if section == "reproduce":
-        return key in swept
-    return not any(
-        f"{name}.".startswith(f"{other}.") for other in (*(f"vehicle.{key}" for key in PLANTS[plant].unused), *foreign)
-    )
-
-
-def full_table(method: Method, runs: Sequence[Run]) -> Table:
-    """Every number of every cell."""
-    cells = [scored.cell for run in runs for scored in run.scored]
-    about = list(vars(cells[0])) if cells else []
-    header = ["run", *about, "mean", "std", "median", "max", "start", "re-lifted", "as printed"]
-    header += ["max yaw error (rad/s)", "worst in emptiest", "diverged", "artefact"]
-    rows = []
-    for run in runs:
-        for scored in run.scored:
-            figures = scored.figures
-            numbers = [statistic_text(figures, name) for name in ("mean", "std", "median", "max")]
-            others = [figures[name]["mean"] for name in ("start_error", "rmse_relift", "rmse_printed")]
-            others += [figures["max_error"]["yaw_rate"], figures["worst_in_emptiest"]]
-            cell = ["" if value is None else str(value) for value in vars(scored.cell).values()]
-            rows.append(
-                [run.label, *cell, *numbers, *map(number_text, others), str(figures["diverged"]), scored.record.name]
-            )
-    title = f"Every evaluation of {method.title}, RMSE in %"
-    return Table(title, header, rows, left=1 + len(about))
-
-
-def number_text(value: float, digits: int = 3) -> str:
-    """A number with ``digits`` significant ones, written as people write it: 3.30, 1230, 1.0e-12."""
-    if not math.isfinite(value):
-        return "–"
-    if value == 0:
-        return "0"
-    exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])
-    if not -SMALLEST <= exponent < LARGEST:
-        return f"{value:.{digits - 1}e}"
-    decimals = digits - 1 - exponent
-    return f"{round(value, decimals):.{max(0, decimals)}f}"
-
-
-def statistic_text(figures: Meta, name: str) -> str:
-    """A statistic of the RMSE: the deviation with two significant digits, any other with three."""
-    return number_text(figures["rmse"][name], 2 if name == "std" else 3)
-
-
-def mean_text(figures: Meta | None) -> str:
-    """``mean ± std`` of the RMSE, or that it diverges."""
-    if figures is None:
-        return "–"
-    if not math.isfinite(figures["rmse"]["mean"]):
-        return "diverges"
-    return f"{statistic_text(figures, 'mean')} ± {statistic_text(figures, 'std')}"
-
-
-def score_text(figures: Meta | None) -> str:
-    """``mean ± std (median)`` of the RMSE, or that it diverges."""
-    text = mean_text(figures)
-    return text if figures is None or "±" not in text else f"{text} ({statistic_text(figures, 'median')})"
 
 
 def drawer(experiment: Experiment) -> Callable[..., Task]:
@@ -241,8 +186,3 @@ def drawer(experiment: Experiment) -> Callable[..., Task]:
         return figure_tasks.figure(figure, artefacts, image, experiment, labels=labels)
 
     return draw
-
-
-def count_text(*numbers: int) -> str:
-    """Counts with thousands apart, joined by a times sign."""
-    return " × ".join(f"{number:,}".replace(",", " ") for number in numbers)

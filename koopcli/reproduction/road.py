@@ -11,7 +11,7 @@ import numpy as np
 
 from koopcli.records import FloatArray
 from koopcli.reproduction.ghosts import LOST, Shown, Track
-from koopcli.reproduction.report import number_text
+from koopcli.reproduction.texts import number_text
 
 COLOURS = ("#1b1f24", "#d55e00", "#0072b2")  # the true car, and ghosts
 OVERHANG, HALF_WIDTH = 0.8, 0.9  # m, of a car beyond its axles, and to either side

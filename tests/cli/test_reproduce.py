@@ -13,7 +13,8 @@ from koopcli.errors import StorageError
 from koopcli.reproduction import edmd
 from koopcli.reproduction.opening import Part
 from koopcli.reproduction.registry import BEYOND, METHODS
-from koopcli.reproduction.report import Run, number_text
+from koopcli.reproduction.report import Run
+from koopcli.reproduction.texts import number_text
 from koopcli.stages import ahead
 from tests import stock
 from tests.reproduction.pages import Page

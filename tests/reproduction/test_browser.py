@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from koopcli.reproduction.report import number_text
+from koopcli.reproduction.texts import number_text
 
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")

@@ -34,9 +34,10 @@ def figures(mean=3.0, yaw=1e-12, diverged=0, functions=27):
 def run_with(error, experiment=EXPERIMENT, label="here", changes=()):
     """A run whose every cell scores what ``error(cell)`` says: a mean, or all figures."""
     scored = []
-    for cell, _ in blocks.cells(experiment):
+    for cell, task in blocks.cells(experiment):
         found = error(cell)
-        scored.append(Scored(cell, found if isinstance(found, dict) else figures(found), SimpleNamespace(name="x")))
+        score = found if isinstance(found, dict) else figures(found)
+        scored.append(Scored(cell, task, score, SimpleNamespace(name="x")))
     return Run(label, experiment, tuple(scored), changes=changes)
 
 

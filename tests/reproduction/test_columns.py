@@ -7,7 +7,7 @@ import re
 import pytest
 
 from koopcli.reproduction.columns import aligned, is_numeric
-from koopcli.reproduction.report import number_text, score_text
+from koopcli.reproduction.texts import number_text, score_text
 
 PADDED = re.compile(r'<span(?: data-l="([^"]*)")?(?: data-r="([^"]*)")?>([^<]*)</span>')
 

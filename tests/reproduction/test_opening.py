@@ -41,7 +41,7 @@ def plans() -> dict[str, Plan]:
 
 def part(plan, mean=3.304, drawn=True):
     record = SimpleNamespace(name="evaluate/1", provenance={"time": "2026-11-27T11:00:00+00:00"})
-    scored = tuple(Scored(cell, scores(mean), record) for cell, _ in plan.cells)
+    scored = tuple(Scored(cell, task, scores(mean), record) for cell, task in plan.cells)
     drawing = Drawing("orders", "svg", {}, b"<svg/>") if drawn else None
     pictures = [
         Illustration(one.task.settings.figure, one.caption, "here", "koop", drawing, None, (), "no numbers", one.leads)

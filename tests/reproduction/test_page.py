@@ -19,7 +19,8 @@ from koopcli.reproduction.illustrations import Illustration
 from koopcli.reproduction.images import address, shrunk
 from koopcli.reproduction.opening import Opening
 from koopcli.reproduction.page import Section, page
-from koopcli.reproduction.report import Table, number_text
+from koopcli.reproduction.report import Table
+from koopcli.reproduction.texts import number_text
 from tests.reproduction.pages import Page
 from tests.stages.toys import figure_records, figure_settings
 
