@@ -248,9 +248,9 @@ def check_choice(
 
     ``usual``: None where it is not known yet.
     """
-    kind = usual
+    kind, alike = usual, list[Layer]()
     for layer in layers:
-        kind = layer.values.get("kind", kind)
+        before, kind = kind, layer.values.get("kind", kind)
         tables = [key for key, value in layer.values.items() if isinstance(value, Mapping) and not _any_has(kinds, key)]
         for name in [*([] if kind is None else [kind]), *tables]:
             if not isinstance(name, str) or name not in kinds:
@@ -262,20 +262,23 @@ def check_choice(
                 for name in value:
                     _check_owner(kinds, key, name, layer.origin, f"{prefix}{key}.", what)
                 _checked(kinds[key], [Layer(value, layer.origin)], f"{prefix}{key}.")
+            elif kind is None:
+                _check_any(kinds, Layer({key: value}, layer.origin), prefix)
             elif key != "kind":
-                _check_loose(kinds, kind, Layer({key: value}, layer.origin), prefix, what)
+                _check_owner(kinds, kind, key, layer.origin, prefix, what)
+        if kind is not None:
+            loose = layer.only(lambda key, value: key != "kind" and not _is_table(key, value, kinds))
+            alike = [*(alike if kind == before else []), loose]
+            _checked(kinds[kind], alike, prefix)
 
 
-def _check_loose(kinds: Mapping[str, type[Choice]], kind: str | None, layer: Layer, prefix: str, what: str) -> None:
-    """Refuse a setting without a table that the ``kind`` in effect, else every kind, does not take."""
+def _check_any(kinds: Mapping[str, type[Choice]], layer: Layer, prefix: str) -> None:
+    """Refuse a setting that none of the kinds takes, where it is not known which one is in effect."""
     (key,) = layer.values
-    if kind is not None:
-        _check_owner(kinds, kind, key, layer.origin, prefix, what)
-    owners = [name for name, cls in kinds.items() if key in names_of(cls)] or list(kinds)
     refused = []
-    for owner in [kind] if kind is not None else owners:
+    for cls in [cls for cls in kinds.values() if key in names_of(cls)] or kinds.values():
         try:
-            _checked(kinds[owner], [layer], prefix)
+            _checked(cls, [layer], prefix)
         except KoopError as error:
             refused.append(error)
         else:
@@ -290,7 +293,8 @@ def _check_owner(
     owners = [name for name, cls in kinds.items() if key in names_of(cls)]
     if owners and kind not in owners:
         whose = " or ".join(f"'{owner}'" for owner in owners)
-        text = origin.say(f"'{prefix}{key}' belongs to {what} {whose}, and this {what} is '{kind}'")
+        this = f"these {what} are" if what in ("eigenvalues", "terms") else f"this {what} is"
+        text = origin.say(f"'{prefix}{key}' belongs to {what} {whose}, and {this} '{kind}'")
         raise MisplacedError(text, f"{prefix}{key}") if origin.misnamed is UsageError else origin.misnamed(text)
 
 

@@ -56,8 +56,8 @@ COMMANDS = (
         LOOK,
         "Compare two artefacts: every setting behind them, their arrays, and the small facts beside those.",
     ),
-    Entry("pin", "keeping", LOOK, "Mark an artefact to be kept."),
-    Entry("unpin", "keeping", LOOK, "Take back a pin, of one artefact or of a reproduction."),
+    Entry("pin", "looking", LOOK, "Mark an artefact to be kept."),
+    Entry("unpin", "looking", LOOK, "Take back a pin, of one artefact or of a reproduction."),
     Entry(
         "verify",
         "keeping",

@@ -45,7 +45,7 @@ def options_of(*classes: type, only: Sequence[str] = (), but: Sequence[str] = ()
 
         @wraps(command)
         def run(**values: Any) -> None:
-            given = {name: values.pop(name) for name in declared}
+            given = {name: values.pop(name, None) for name in declared}
             command(given={name: value for name, value in given.items() if value not in (None, [])}, **values)
 
         run.__signature__ = signature  # type: ignore[attr-defined]

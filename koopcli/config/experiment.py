@@ -158,17 +158,16 @@ class Experiment:
             for key in keys:
                 value = getattr(value, key, None)
             return value
-        kinds = dict(zip(keys[:-1:2], keys[1:-1:2], strict=True))
         if section in KINDS:
             own = self.tabled(keys[0], section) if len(keys) > 1 else self._sampled(section, sample, self.vehicle)
             return written(own).get(keys[-1])
-        if section == "simulate" and self.simulate.plant is None:
+        if section == "simulate" and self.simulate.plant is None and keys[-1] not in written(self.simulate):
             return [written(self.plant_for(kind)).get(keys[-1]) for kind in PlantChoice.kinds().values()]
-        beside = {name: getattr(self, name) for name in taken(DECLARED[section])}
-        layers = [*(source.section(section) for source in self.sources), Layer(kinds)]
-        return written(build_layers(DECLARED[section], layers, beside=beside)).get(
-            keys[-2] if keys[-1] == "kind" else keys[-1]
-        )
+        name = keys[-2] if keys[-1] == "kind" and len(keys) > 1 else keys[-1]
+        beside = {other: getattr(self, other) for other in taken(DECLARED[section])}
+        chosen = Layer(dict(zip(keys[:-1:2], keys[1:-1:2], strict=False)))
+        layers = [*(source.section(section) for source in self.sources), chosen]
+        return written(build_layers(DECLARED[section], layers, beside=beside)).get(name)
 
     def without(self, name: str) -> Experiment:
         """The experiment without a change of the command line."""

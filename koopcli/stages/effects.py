@@ -44,11 +44,8 @@ def _in_effect(name: str, experiment: Experiment, other: Experiment, steps: Sequ
         made = [written(step.settings) for step in steps if step.stage == "sample"]
         return any(one["kind"] == kind and one.get(key) == value for one in made for kind, value in given)
     value = experiment.value(name)
-    made = [written(step.settings) for step in steps if step.stage == section]
-    return value == other.value(name) or any(one.get(key.rpartition(".")[2], _NOTHING) == value for one in made)
-
-
-_NOTHING = object()
+    last, made = key.rpartition(".")[2], [written(step.settings) for step in steps if step.stage == section]
+    return value == other.value(name) or (bool(made) and all(last in one and one[last] == value for one in made))
 
 
 def _has(experiment: Experiment, name: str, kind: str) -> bool:
@@ -62,22 +59,38 @@ def _has(experiment: Experiment, name: str, kind: str) -> bool:
 def _reason(name: str, tasks: Sequence[Task], steps: Sequence[Task]) -> str:
     """Why nothing depends on a setting, in words."""
     section, _, key = name.partition(".")
-    samples = [step.settings for step in steps if step.stage == "sample"]
-    plants = [step.settings.plant.kind for step in steps if step.stage == "simulate"]
-    used = {step.stage for step in steps} | ({"test"} if samples else set())
+    samples, plants = _samples(section, steps), [step.settings.plant.kind for step in steps if step.stage == "simulate"]
+    used = {step.stage for step in steps} - {"plot", "sample"} | ({"sample", "test"} if samples else set())
     used |= {"vehicle", "simulate"} if plants or any(taken(type(sample)) for sample in samples) else set()
     figure = tasks[0].settings.figure if tasks[0].stage == "plot" else ""
-    if section not in used:
-        return _not_behind(section, figure, samples)
     kind = key.partition(".")[0]
     if section in KINDS and "." in key and kind not in {sample.kind for sample in samples}:
         return f"no {section} of kind '{kind}' is used"
+    instead = f": {FIGURES[figure].instead}" if figure and FIGURES[figure].instead else ""
+    if section not in used:
+        return _not_behind(section, figure, samples) + instead
     if section in KINDS and "none" in {getattr(sample, "excitation", "") for sample in samples}:
         return "the excitation 'none' has no use for it"
+    plants += [sample.meant_for.kind for sample in samples if hasattr(sample, "vehicle")]
     if section in ("vehicle", "simulate") and plants:
         return f"the plant '{plants[0]}' has no use for it"
-    instead = FIGURES[figure].instead if figure else ""
-    return f"the figure '{figure}' chooses it: {instead}" if instead else "the same is made without it"
+    if section == "vehicle":
+        names = " and ".join(taken(type(samples[0])))
+        return f"a sample of kind '{samples[0].kind}' takes {names} of the vehicle alone"
+    return f"the figure '{figure}' draws nothing of it{instead}" if figure else "the same is made without it"
+
+
+def _samples(section: str, steps: Sequence[Task]) -> list[SampleChoice]:
+    """The settings of the samples behind ``steps``, of a section of samples those alone that are its own."""
+    every = [step for step in steps if step.stage == "sample"]
+    tests = [task for step in steps if step.stage in ("evaluate", "plot") for role, task in step.inputs if _tests(role)]
+    tested = {sample for test in tests for sample in test.upstream() if sample.stage == "sample"}
+    own = {"test": [step for step in every if step in tested], "sample": [step for step in every if step not in tested]}
+    return [step.settings for step in own.get(section) or (every if section != "test" else [])]
+
+
+def _tests(role: str) -> bool:
+    return role.rpartition("/")[2] == "trajectories"
 
 
 def _not_behind(section: str, figure: str, samples: Sequence[SampleChoice]) -> str:

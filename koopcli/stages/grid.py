@@ -110,15 +110,17 @@ def _refuse_idle(
     """Raise ``UsageError`` for a setting that changes nothing in any cell."""
     alike = [axis.name for a, axis in enumerate(grid.axes) if all(_idle(grid, tasks, place, a) for place in tasks)]
     for name in [*alike, *dict(grid.fixed)]:
-        reason = None
+        reasons = []
         for place, settings in grid.cells():
             experiment, left_out = _experiment(base, settings)
             if name not in [error.setting for error in left_out]:
-                reason = why_idle(name, experiment, plan, [tasks[place]])
-                if reason is None:
-                    break
-        if reason is not None:
-            raise UsageError(f"{name} changes nothing here: {reason}")
+                reasons.append(why_idle(name, experiment, plan, [tasks[place]]))
+            if reasons and reasons[-1] is None and name not in alike:  # an axis has the value in effect in some cells
+                break
+        else:
+            raise UsageError(
+                f"{name} changes nothing here: {next(filter(None, reasons), 'it is the same in every cell')}"
+            )
 
 
 def sweep(grid: Grid, chosen: Sequence[Cell]) -> Task:

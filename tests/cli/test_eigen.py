@@ -162,7 +162,7 @@ def test_a_vehicle_without_tyres(koop, folder):
 def test_a_foreign_test_set(koop):
     forces = koop("simulate", koop("sample", "box").name).name
     one_line(koop("evaluate", koop("fit-eigen").name, "--on", forces), 3, "different states or inputs")
-    one_line(koop("evaluate", koop("fit-eigen").name, "--excitation", "held"), 2, "'test.excitation' belongs to kind")
+    one_line(koop("evaluate", koop("fit-eigen").name, "--excitation", "held"), 2, "'test.excitation' belongs to test")
 
 
 @pytest.mark.slow

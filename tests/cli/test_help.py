@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from koopcli.__main__ import main
-from koopcli.cli.app import FIRST, root
+from koopcli.cli.app import FIRST, whole
 from koopcli.cli.reference import reference
 
 ROOT = Path(__file__).parents[2]
-TOP = root().commands
+TOP = whole()
 COMMANDS = {
     " ".join([name, *part]): inner
     for name, command in TOP.items()

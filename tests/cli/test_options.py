@@ -9,7 +9,8 @@ from typing import Literal, get_args, get_origin, get_type_hints
 import pytest
 
 from koopcli.checks import build
-from koopcli.cli import evaluating, fitting, invocation, making
+from koopcli.cli import evaluating, fitting, making
+from koopcli.config import experiment
 from koopcli.config.changes import flat
 from koopcli.errors import KoopError
 from koopcli.koopman.eigen.fit import FitEigen
@@ -41,7 +42,7 @@ def changes_of(monkeypatch):
             command(**given, **({"context": None} if command is evaluating.evaluate else {}))
         return dict(found)
 
-    monkeypatch.setattr(invocation, "load_experiment", spy)
+    monkeypatch.setattr(experiment, "load_experiment", spy)
     return of
 
 

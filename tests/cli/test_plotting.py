@@ -123,7 +123,7 @@ def test_one_changed_assumption(koop):
         ("error-map", "plot.restart=7", "draws nothing of it"),
         ("error-map", "test.point.seed=7", "no test of kind 'point' is used"),
         ("compare", "fit-edmd.order=3", "fixed baselines"),
-        ("compare", "baseline.kind=hold", "fixed baselines"),
+        ("compare", "baseline.kind=rotation", "fixed baselines"),
         ("spectrum", "test.box.seed=2", "no test of kind 'box'"),
         ("spectrum", "test.seed=2", "draws nothing of it"),
         ("random-input", "test.seed=2", "draws nothing of it"),  # it is of its own kind, whichever is in use

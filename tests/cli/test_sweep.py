@@ -114,7 +114,7 @@ def test_cells_that_fail_cost_the_others_nothing(koop, monkeypatch):
     real = STAGES["fit-edmd"]
 
     def run(settings, inputs, context):
-        if settings.order == 2:
+        if settings.basis.order == 2:
             raise InvalidValueError("no good")
         return real.run(settings, inputs, context)
 
@@ -135,7 +135,7 @@ def test_interrupted_it_goes_on(koop, monkeypatch):
     def run(settings, inputs, context):
         if len(done) == 2:
             raise KeyboardInterrupt
-        done.append(settings.order)
+        done.append(settings.basis.order)
         return real(settings, inputs, context)
 
     from dataclasses import replace
@@ -197,7 +197,7 @@ def test_a_dry_run_makes_nothing(koop, folder):
         ((), 2, "what is swept?"),
         (("--set", "fit-edmd.order=2"), 2, "what is swept?"),
         (("--set", "fit-edmd.ordr=1:2"), 2, "did you mean 'order'"),
-        (("--set", "fit-edmd.terms=linear,bilinaer"), 2, "cannot be 'bilinaer'"),
+        (("--set", "fit-edmd.terms=linear,bilinaer"), 2, "unknown kind of terms 'bilinaer': did you mean 'bilinear'"),
         (("--set", "fit-edmd.order=0:2"), 3, "at least 1, got 0"),
         (("--set", "fit-edmd.order=2:1"), 3, "both ends included"),
         (("--set", "fit-eigen.degree=1:2"), 2, "changes nothing here"),

@@ -67,7 +67,7 @@ def test_manoeuvres(koop, folder):
     assert "name=brake-in-turn" in koop("plot", "trajectory", *other).out
     one_line(koop("sample", "manoeuvre", "moose"), 2, "moose")
     one_line(koop("sample", "manoeuvre", "--set", "vehicle.mu_scale=0"), 3, "no steer turns a car without grip")
-    one_line(koop("sample", "drive", "step-steer"), 2, "'sample.name' belongs to kind 'manoeuvre'")
+    one_line(koop("sample", "drive", "step-steer"), 2, "'sample.name' belongs to sample 'manoeuvre'")
     one_line(koop("sample", "manoeuvre", "--speed", "-3"), 3, "'sample.speed' must be above 0 m/s")
     one_line(koop("simulate", sample.name, "--dt", "0.02"), 3, "every 0.01 s", "--set simulate.dt=0.02")
     slower = koop("sample", "manoeuvre", "--set", "simulate.dt=0.02")
@@ -81,7 +81,7 @@ def test_manoeuvres(koop, folder):
         (("--set", "sample.slowest=40"), 3, ("'sample.slowest' 40 m/s must not be above 'sample.fastest' 30 m/s",)),
         (("--set", "sample.torque=-1"), 3, ("'sample.torque' must be at least 0 N m",)),
         (("--combined", "square"), 2, ("square",)),
-        (("--force-per", "wheel"), 2, ("the plant 'wheels' has no use for it",)),
+        (("--force-per", "wheel"), 2, ("belongs to plant 'forces', and this plant is 'wheels'",)),
         (("--set", "simulate.v_eps=0"), 3, ("'simulate.v_eps' must be above 0 m/s",)),
         (("--set", "sample.torque=nan"), 3, ("'sample.torque' must be a finite number",)),
         (("--set", "sample.excitation=none", "--set", "sample.steer=0.1"), 2, ("'none' has no use for it",)),
@@ -93,7 +93,11 @@ def test_wrong_settings_of_wheels(koop, options, code, parts):
 
 def test_options_of_other_plants_are_refused(koop):
     one_line(koop("simulate", "--combined", "ellipse"), 2, "the plant 'forces' has no use for it")
-    one_line(koop("simulate", "--plant", "slips", "--set", "simulate.brake_width=2"), 2, "has no use for it")
+    one_line(
+        koop("simulate", "--plant", "slips", "--set", "simulate.brake_width=2"),
+        2,
+        "and this plant is 'slips'",
+    )
     one_line(koop("simulate", koop("sample", "box").name, "--plant", "wheels"), 3, "drive or drive-test or manoeuvre")
 
 
