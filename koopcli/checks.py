@@ -165,7 +165,7 @@ def told(settings: Any) -> Values:
         value = getattr(settings, f.name)
         if isinstance(value, Choice):
             values |= ({} if value.kind == getattr(f.default, "kind", "") else {f.name: value.kind}) | told(value)
-        elif value != f.default:
+        elif value != f.default and f.name not in taken(type(settings)):
             values[f.name] = value
     return values
 

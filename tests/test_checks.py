@@ -1,15 +1,30 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from koopcli.checks import build, from_file, setting
-from koopcli.errors import InvalidValueError, UsageError
+from koopcli.checks import (
+    Choice,
+    Layer,
+    Settings,
+    build,
+    check_choice,
+    choose,
+    from_file,
+    names_of,
+    restored,
+    setting,
+    taken_from,
+    told,
+    written,
+)
+from koopcli.errors import InvalidValueError, KoopError, MisplacedError, UsageError
 
 
 @dataclass(frozen=True)
@@ -75,3 +90,139 @@ def test_any_value_is_taken_or_refused_by_name(value):
     else:
         with pytest.raises(InvalidValueError, match="'width'"):
             build(Example, {"width": value})
+
+
+# --- choices among kinds with settings of their own
+
+
+class Corner(Choice):
+    pass
+
+
+@dataclass(frozen=True)
+class Sharp(Corner):
+    """No radius."""
+
+    kind: ClassVar[str] = "sharp"
+
+
+@dataclass(frozen=True)
+class Round(Corner):
+    """One radius."""
+
+    kind: ClassVar[str] = "round"
+    radius: float = setting(2.0, above=0)
+
+
+class Shape(Choice):
+    pass
+
+
+@dataclass(frozen=True)
+class Ball(Shape):
+    """As far in every direction."""
+
+    kind: ClassVar[str] = "ball"
+    size: float = setting(1.0, above=0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box(Shape):
+    """With corners."""
+
+    kind: ClassVar[str] = "box"
+    size: float = setting(3.0, above=0)
+    corner: Corner = setting(Sharp())
+    owner: str = taken_from("person")
+
+
+@dataclass(frozen=True)
+class Thing(Settings):
+    shape: Shape = setting(Ball())
+    count: int = setting(1, low=1)
+
+
+OF_SHAPES = Shape.kinds()
+
+
+def thing(*layers, usual="ball"):
+    layers = [Layer(values) for values in layers]
+    return choose(OF_SHAPES, layers, usual, "thing.", "shape", {"owner": "me"})
+
+
+def test_a_setting_stands_beside_the_choice_that_has_it():
+    assert Thing.of(size=5, count=2) == Thing(Ball(5.0), 2)
+    assert names_of(Thing) == ("shape", "count", "size", "corner", "radius")
+    assert written(Thing.of(size=5)) == {"shape": "ball", "size": 5.0, "count": 1}
+    assert thing({"kind": "box", "corner": "round", "radius": 1}) == Box(corner=Round(1.0), owner="me")
+
+
+@pytest.mark.parametrize(
+    ("layers", "made"),
+    [
+        (({"size": 4}, {"kind": "box"}), Box(size=4.0, owner="me")),  # both kinds have it
+        (
+            ({"kind": "box", "corner": "round"}, {"radius": 7}, {"size": 2}),
+            Box(size=2.0, corner=Round(7.0), owner="me"),
+        ),
+        (({"box": {"size": 8}, "ball": {"size": 9}},), Ball(9.0)),  # tables of kinds, in effect or not
+        (({"box": {"size": 8}}, {"kind": "box"}), Box(size=8.0, owner="me")),
+        (({"ball": {"size": 8}}, {"size": 4}), Ball(4.0)),
+        (({"size": 4}, {"ball": {"size": 8}}), Ball(8.0)),  # the later layer wins, however it says it
+        (({"kind": "box", "corner": {"kind": "round", "round": {"radius": 5}}},), Box(corner=Round(5.0), owner="me")),
+        (({"kind": "box", "corner": "round", "radius": 5}, {"corner": "sharp"}), Box(owner="me")),
+        (({"kind": "box", "corner": "round"}, {"kind": "ball"}), Ball()),  # what only the other kind had is left
+    ],
+)
+def test_later_layers_win(layers, made):
+    assert thing(*layers) == made
+
+
+def test_where_one_name_means_two_things_a_change_of_kind_starts_afresh(monkeypatch):
+    monkeypatch.setattr(Shape, "afresh", True)
+    assert thing({"size": 4}, {"kind": "box"}) == Box(owner="me")
+    assert thing({"size": 4}, {"kind": "ball", "size": 5}) == Ball(5.0)
+
+
+def test_a_copy_keeps_what_both_kinds_have_and_is_not_at_its_default():
+    assert Thing.of(size=5).but(count=3) == Thing(Ball(5.0), 3)
+    assert Thing.of(size=5).but(size=1) == Thing()
+    assert Thing.of(count=2).but(size=1) == Thing(count=2)
+
+
+@pytest.mark.parametrize(
+    ("layers", "error", "says"),
+    [
+        (({"corner": "round"},), MisplacedError, "'thing.corner' belongs to shape 'box', and this shape is 'ball'"),
+        (({"kind": "box", "radius": 3},), MisplacedError, "'thing.radius' belongs to corner 'round', and this corner"),
+        (({"ball": {"corner": "round"}},), MisplacedError, "'thing.ball.corner' belongs to shape 'box'"),
+        (({"kind": "boll"},), UsageError, "unknown kind of shape 'boll': did you mean 'ball'"),
+        (({"kind": ["ball"]},), UsageError, "unknown kind of shape"),
+        (({"bix": {"size": 1}},), UsageError, "unknown kind of shape 'bix': did you mean 'box'"),
+        (({"sise": 3},), UsageError, "unknown setting 'thing.sise': did you mean 'size'"),
+        (({"box": {"size": 0}},), InvalidValueError, "'thing.box.size' must be above 0"),
+        (({"size": 0}, {"size": 1}), InvalidValueError, "'thing.size' must be above 0"),
+        (({"kind": "box", "owner": "you"},), UsageError, "'thing.owner' is the simulation's: set person.owner"),
+    ],
+)
+def test_what_no_kind_in_effect_has_is_refused(layers, error, says):
+    with pytest.raises(error, match=re.escape(says)):
+        thing(*layers)
+    with pytest.raises(InvalidValueError, match=r"mine\.toml"):
+        choose(OF_SHAPES, [Layer(v, from_file("mine.toml")) for v in layers], "ball", "thing.", "shape", {"owner": ""})
+
+
+def test_where_the_kind_is_not_known_yet_any_kind_may_have_a_setting():
+    for values in ({"size": 3}, {"corner": "round"}, {"box": {"size": 3}}):
+        check_choice(OF_SHAPES, [Layer(values)], None, "thing.", "shape")
+    for values in ({"sise": 3}, {"size": 0}, {"corner": "flat"}):
+        with pytest.raises(KoopError):
+            check_choice(OF_SHAPES, [Layer(values)], None, "thing.", "shape")
+
+
+@given(st.sampled_from(["ball", "box"]), st.floats(0.1, 10), st.none() | st.floats(0.1, 10))
+def test_written_and_restored_it_is_the_same(kind, size, radius):
+    round_ = {} if radius is None or kind == "ball" else {"corner": "round", "radius": radius}
+    made = thing({"kind": kind, "size": size, **round_})
+    assert restored(Shape, written(made)) == made
+    assert thing(told(made), usual=kind) == made

@@ -90,7 +90,7 @@ def test_settings_without_effect_are_one_cell(koop):
     ]
     refused = koop("sweep", "--set", "fit-edmd.basis=states", "--set", "fit-edmd.order=1:2")
     assert refused.code == 2
-    one_line(refused, 2, "fit-edmd.order changes nothing here")
+    one_line(refused, 2, "and this basis is 'states'")
 
 
 def test_cells_that_cannot_work_are_left_out_and_said(koop):
