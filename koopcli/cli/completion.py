@@ -1,4 +1,4 @@
-"""What a shell completes besides options: names that are known, found without numerics.
+"""What a shell completes besides options: names that are known, but for settings without numerics.
 
 A completion never complains: where names cannot be listed there are none.
 """
@@ -38,6 +38,20 @@ def complete_stage(incomplete: str) -> list[str]:
 def complete_figure(incomplete: str) -> list[str]:
     """Figures."""
     return _beginning(NAMES, incomplete)
+
+
+def complete_setting(incomplete: str) -> list[str]:
+    """Settings by the names that hold for the kind in effect, or for the kind that is named, then their values."""
+    from koopcli.cli.derived import values_of
+    from koopcli.config.declared import every_setting
+
+    settings = list(every_setting())
+    name, equals, _ = incomplete.partition("=")
+    if equals:
+        values = [value for one in settings if name in (one.short_name, one.full_name) for value in values_of(one.hint)]
+        return _beginning(dict.fromkeys(f"{name}={value}" for value in values), incomplete)
+    short, full = ([f"{getattr(one, which)}=" for one in settings] for which in ("short_name", "full_name"))
+    return _beginning(dict.fromkeys([*short, "vehicle.name="]), incomplete) or _beginning(full, incomplete)
 
 
 def complete_experiment(incomplete: str) -> list[str]:

@@ -125,6 +125,16 @@ def ordered(base: type[Choice], default: object) -> Mapping[str, type[Choice]]:
     return {name: kinds[name] for name in sorted(kinds, key=lambda name: name != getattr(default, "kind", None))}
 
 
+def values_of(hint: Any) -> list[str]:
+    """The values that a setting may have by name: kinds, enumerated values, true and false."""
+    bare = without_none(hint)
+    if get_origin(bare) is tuple:
+        bare = get_args(bare)[0]
+    if isinstance(bare, type) and issubclass(bare, Choice):
+        return list(bare.kinds())
+    return ["true", "false"] if bare is bool else [*get_args(bare)] if get_origin(bare) is Literal else []
+
+
 def said_of(kinds: Mapping[str, type[Choice]]) -> str:
     """What every one of ``kinds`` is."""
     return "; ".join(f"{name}: {_said(kind)}" for name, kind in kinds.items())

@@ -7,7 +7,7 @@ from typing import Annotated, Any, get_args
 
 import typer
 
-from koopcli.cli.completion import complete_experiment, complete_vehicle
+from koopcli.cli.completion import complete_experiment, complete_setting, complete_vehicle
 
 
 def names(literal: Any) -> str:
@@ -31,6 +31,7 @@ SetOption = Annotated[
     typer.Option(
         "--set",
         metavar="STAGE.KEY=VALUE",
+        autocompletion=complete_setting,
         help="Change one setting of any stage behind this one, such as vehicle.Jzz=1731 or sample.box=[20,20,5]; "
         "docs/cli.md lists them. It may be repeated; the command's own options win.",
     ),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from koopcli.cli.completion import complete_setting
 from koopcli.cli.invocation import Invocation, begin, describe, print_json
 from koopcli.cli.options import (
     ClusterOption,
@@ -52,6 +53,7 @@ def sweep(
         typer.Option(
             "--set",
             metavar="STAGE.KEY=VALUES",
+            autocompletion=complete_setting,
             help="A setting of any stage with the values to try: fit-edmd.order=1:12 (both ends), "
             "fit-edmd.terms=linear,bilinear, fit-edmd.ridge=0,1e-6,1e-4, sample.seed=0:29, vehicle.Jzz=1000:2000:250, "
             "or with one value for all. May be repeated; every combination is made.",

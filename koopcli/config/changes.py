@@ -37,7 +37,9 @@ def parse_set(assignments: Sequence[str]) -> Changes:
         name, equals, raw = text.partition("=")
         section, *keys = name.strip().split(".")
         if not (equals and keys and all(keys)):
-            raise UsageError(f"--set {text}: write --set stage.key=value, such as --set vehicle.Jzz=1731")
+            raise UsageError(
+                f"--set {text.strip() or repr('')}: write --set stage.key=value, such as --set vehicle.Jzz=1731"
+            )
         if section not in SECTIONS:
             raise UsageError(f"--set {text}: unknown stage '{section}'{candidates(section, SECTIONS)}")
         given.append((name.strip(), toml_value(raw)))

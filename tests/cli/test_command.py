@@ -16,7 +16,7 @@ from tests.cli.test_help import COMMANDS
 
 FIRST = {"baseline": ["hold"], "plot": ["orders"], "sweep": ["--set", "fit-edmd.order=1,2"]}
 LOOKED_UP = {"--experiment", "--vehicle", "--on"}
-ENUMERATED = {"--mirror"}
+ENUMERATED = {"--mirror", "--set"}
 
 
 def texts() -> list[tuple[str, str | None]]:

@@ -43,6 +43,20 @@ def test_names_that_never_change_complete(complete, folder):
     assert complete("evaluate", "--experiment", "./sm") == []  # files are the shell's
 
 
+def test_settings_complete_with_their_values(complete, folder):
+    assert complete("fit-edmd", "--set", "fit-edmd.o") == ["fit-edmd.order="]
+    assert complete("sweep", "--set", "vehicle.l_") == ["vehicle.l_f=", "vehicle.l_r="]
+    assert complete("fit-edmd", "--set", "fit-edmd.basis.thin") == [
+        f"fit-edmd.basis.thin-plate.{name}=" for name in ("centres", "placement", "seed")
+    ]
+    assert complete("fit-eigen", "--set", "fit-eigen.lift=") == [
+        f"fit-eigen.lift={kind}" for kind in ("linear", "mls", "nearest", "polyharmonic")
+    ]
+    assert complete("fit-eigen", "--set", "fit-eigen.trust=t") == ["fit-eigen.trust=true"]
+    assert complete("fit-edmd", "--set", "fit-edmd.nonsense") == []
+    assert complete("fit-edmd", "--set", "fit-edmd.order=") == []
+
+
 def test_artefacts_complete_in_the_store_that_is_named(complete, koop, folder):
     name, other = koop("sample").name, koop("sample", "--store", "elsewhere", "--seed", "5").name
     for command in (["show"], ["simulate"], ["evaluate", "--on"], ["plot", "energy-surface"]):
