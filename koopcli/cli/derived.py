@@ -72,7 +72,9 @@ def _declared(classes: Sequence[type]) -> dict[str, list[Use]]:
             if f.name in taken(cls):
                 continue
             if f.metadata.get("option"):
-                declared.setdefault(f.name, []).append(Use(kind, hints[f.name], f.default, f.metadata["help"]))
+                unit = f", in {f.metadata['unit']}" if f.metadata["unit"] not in ("", "1") else ""
+                use = Use(kind, hints[f.name], f.default, f"{f.metadata['help']}{unit}")
+                declared.setdefault(f.name, []).append(use)
             if f.name in choices(cls):
                 for name, uses in _declared(tuple(choices(cls)[f.name].kinds().values())).items():
                     declared.setdefault(name, []).extend(uses)
@@ -110,7 +112,7 @@ def _default(uses: Sequence[Use]) -> str:
     """The defaults in parentheses, each with the kinds that have it where they are not the same."""
     by_default: dict[str, list[str]] = {}
     for use in uses:
-        if use.default not in (None, MISSING, False, ()):
+        if use.default is not MISSING and not isinstance(use.default, (bool, tuple, type(None))):
             text = f"{use.default:g}" if isinstance(use.default, float) else str(use.default)
             by_default.setdefault(text, []).append(use.kind)
     if sum(map(len, by_default.values())) == len(uses) and len(by_default) == 1:
@@ -143,7 +145,7 @@ def said_of(kinds: Mapping[str, type[Choice]]) -> str:
 def _said(kind: type[Choice]) -> str:
     """What a kind is: the first line of its docstring."""
     line = (kind.__doc__ or "").partition("\n")[0].rstrip(".")
-    return f"{line[0].lower()}{line[1:]}" if line[1:2].islower() else line
+    return f"{line[0].lower()}{line[1:]}" if line[1:2].islower() or line.startswith("A ") else line
 
 
 def _capital(text: str) -> str:

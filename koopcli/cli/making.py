@@ -25,8 +25,9 @@ from koopcli.cli.options import (
 from koopcli.config.changes import Values
 from koopcli.config.settings import Simulate
 from koopcli.console import show_table
+from koopcli.simulation.manoeuvres import ManoeuvreName
 from koopcli.simulation.samples.grid import GridSample
-from koopcli.simulation.samples.manoeuvre import ManoeuvreName, ManoeuvreSample
+from koopcli.simulation.samples.manoeuvre import ManoeuvreSample
 from koopcli.simulation.samples.sample import SampleChoice
 
 if TYPE_CHECKING:

@@ -9,9 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from koopcli.vehicles.handling import G, steady_steer, tyres_of, wheel_loads
 from koopcli.vehicles.parameters import VehicleParameters
+
+ManoeuvreName = Literal["step-steer", "double-lane-change", "sine-with-dwell", "brake-in-turn", "drift-entry"]
 
 KMH = 1 / 3.6  # m/s
 
@@ -152,7 +155,7 @@ def _drift_entry(driver: Driver, t: float) -> Controls:
     return Controls(turn * _ramp(t, 0.2, 0.5) * counter, (0.0, driver.cruise if t < 1.5 else spin))
 
 
-MANOEUVRES: dict[str, Manoeuvre] = {
+MANOEUVRES: dict[ManoeuvreName, Manoeuvre] = {
     "step-steer": Manoeuvre(
         "steer turned within .15 s to what holds 4 m/s² of lateral acceleration",
         "ISO 7401:2011, step input, 80 km/h",

@@ -20,14 +20,14 @@ from koopcli.koopman.eigen.fit import FitEigen
 from koopcli.koopman.eigen.frames import FRAMES
 from koopcli.koopman.eigen.windows import Ahead
 from koopcli.koopman.scores.baselines import FORECASTS
-from koopcli.simulation.manoeuvres import MANOEUVRES
+from koopcli.simulation.manoeuvres import MANOEUVRES, ManoeuvreName
 from koopcli.simulation.samples.ball import BallSample
 from koopcli.simulation.samples.box import BoxSample
 from koopcli.simulation.samples.drive import DriveSample, DriveTestSample
 from koopcli.simulation.samples.ellipsoid import EllipsoidSample
 from koopcli.simulation.samples.greedy import GreedySample
 from koopcli.simulation.samples.grid import GridSample
-from koopcli.simulation.samples.manoeuvre import ManoeuvreName, ManoeuvreSample
+from koopcli.simulation.samples.manoeuvre import ManoeuvreSample
 from koopcli.simulation.samples.sample import INPUTS, Excitation
 from koopcli.simulation.sampling import DRAWS, MESHES
 from koopcli.stages.makers import LIFTED

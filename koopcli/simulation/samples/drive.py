@@ -80,14 +80,14 @@ class Driven(SampleChoice):
 
 @dataclass(frozen=True, kw_only=True)
 class DriveSample(Driven):
-    """The training set on wheels."""
+    """Cars under way on wheels, with torques and steer, to train."""
 
     kind: ClassVar[str] = "drive"
 
 
 @dataclass(frozen=True, kw_only=True)
 class DriveTestSample(Driven):
-    """Its test set, of another seed."""
+    """The same of another seed, to test."""
 
     kind: ClassVar[str] = "drive-test"
     tests = True

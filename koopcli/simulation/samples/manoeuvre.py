@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 
 from koopcli.checks import setting, taken_from
 from koopcli.errors import InvalidValueError
 from koopcli.progress import Progress
-from koopcli.simulation.manoeuvres import MANOEUVRES, Driver
+from koopcli.simulation.manoeuvres import MANOEUVRES, Driver, ManoeuvreName
 from koopcli.simulation.samples.sample import Drawn, SampleChoice
 from koopcli.vehicles.handling import understeer_gradient
 from koopcli.vehicles.parameters import VehicleParameters
 from koopcli.vehicles.plants.wheels import TorqueInput, Wheels
-
-ManoeuvreName = Literal["step-steer", "double-lane-change", "sine-with-dwell", "brake-in-turn", "drift-entry"]
 
 
 @dataclass(frozen=True, kw_only=True)
