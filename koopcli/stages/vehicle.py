@@ -9,6 +9,7 @@ from dataclasses import fields
 
 from koopcli.checks import taken
 from koopcli.config.experiment import Experiment
+from koopcli.figures.kit.registry import FIGURES
 from koopcli.simulation.portrait import measures, odd
 from koopcli.stages.base import Task
 from koopcli.vehicles.parameters import VehicleParameters
@@ -32,8 +33,12 @@ def makes_the_same(experiment: Experiment, tasks: Sequence[Task]) -> str | None:
     other = experiment.before_naming()
     steps = [step for task in tasks for step in task.upstream() if step.key is None]
     steps = [step for step in steps if step.stage in ("sample", "simulate")]
-    if other is None or not steps or other.vehicle_name == experiment.vehicle_name:
+    if other is None or other.vehicle_name == experiment.vehicle_name:
         return None
+    if not steps:
+        drawn = [task.settings.figure for task in tasks if task.stage == "plot"]
+        plain = [figure for figure in drawn if not FIGURES[figure].parameters]
+        return f"the figure '{plain[0]}' draws nothing of {experiment.vehicle_name}" if plain else None
     names = f"{experiment.vehicle_name} and {other.vehicle_name}"
     differing = [name for name in NAMES if getattr(experiment.vehicle, name) != getattr(other.vehicle, name)]
     if not differing:

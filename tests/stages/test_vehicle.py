@@ -55,6 +55,11 @@ def test_no_shipped_vehicle_is_odd(tmp_path):
     assert not warned(tmp_path, *fits)
 
 
+def test_a_figure_that_draws_no_vehicle_says_so(koop, folder):
+    assert "draws nothing of rimac-2018" in koop("plot", "single-track", "--set", "vehicle.name=rimac-2018").err
+    assert "draws nothing" not in koop("plot", "tyre", "--set", "vehicle.name=rimac-2018", "--dry-run").err
+
+
 def test_another_vehicle_that_makes_the_same_is_named():
     rimac = experiment("vehicle.name=rimac-2018")
     assert recipes.fit_edmd(rimac) == recipes.fit_edmd(experiment())
