@@ -124,7 +124,7 @@ def _nested(typed: Typed, call: Invocation, evaluation: Task, better: Better) ->
     """The command line with another predictor, made by a command inside it; None where its settings cannot be said."""
     from koopcli.config.words import plant_words, sample_words, vehicle_words
     from koopcli.stages import recipes
-    from koopcli.stages.usable import roles_of
+    from koopcli.stages.roles import roles_of
 
     inputs = dict(evaluation.input("predictor").inputs)
     data = [inputs[role] for role in roles_of(inputs)]

@@ -73,10 +73,10 @@ def evaluate(
     scored = {name: given.pop(name) for name in ("restart",) if name in given}
     changes: Changes = {"test": given, "evaluate": scored, "vehicle": {"name": vehicle}}
     call = begin(store, experiment, set_, (*DATA, *FITS, *TEST), changes, workers, cluster)
-    from koopcli.stages import recipes
+    from koopcli.stages import fits, recipes
     from koopcli.stages.verdict import beside
 
-    of = call.optional(predictor, recipes.FITS, "the PREDICTOR", TEST)
+    of = call.optional(predictor, tuple(fits.FITS), "the PREDICTOR", TEST)
     elsewhere = [section for section in call.changes if section != "test"]
     test = call.optional(on, ["simulate"], "--on", elsewhere)
 

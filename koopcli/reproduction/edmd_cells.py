@@ -17,7 +17,7 @@ from koopcli.simulation.samples.grid import GridSample
 from koopcli.simulation.samples.sample import Excitation
 from koopcli.stages import recipes, verdict
 from koopcli.stages.base import Task
-from koopcli.stages.makers import outlook
+from koopcli.stages.fits import outlook
 from koopcli.vehicles.plants.forces import Forces
 
 SWEEP, OTHERS, BASELINES, FORCES, PER_WHEEL, TEST_GRID, TEXTBOOK, DRAWN, DRAWS = (

@@ -14,7 +14,7 @@ from koopcli.simulation.samples.ball import BallSample
 from koopcli.simulation.samples.ellipsoid import EllipsoidSample
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
-from koopcli.stages.makers import outlook
+from koopcli.stages.fits import outlook
 from koopcli.vehicles.handling import G
 
 CUT = 1e-10  # of the readings with optimal boundary functions

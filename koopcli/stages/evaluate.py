@@ -15,8 +15,8 @@ from koopcli.koopman.scores.evaluation import Evaluation, evaluate, join, shorte
 from koopcli.progress import Progress, within
 from koopcli.records import Meta, Packed
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
-from koopcli.stages.makers import outlook
-from koopcli.stages.usable import finished
+from koopcli.stages.fits import outlook
+from koopcli.stages.roles import finished
 
 SAMPLES = 500_000  # scored together, however long the trajectories of a chunk are
 

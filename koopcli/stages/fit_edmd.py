@@ -25,7 +25,7 @@ from koopcli.records import Meta, Packed
 from koopcli.simulation.samples.grid import GridSample
 from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task
 from koopcli.stages.predictors import figures, regression, size
-from koopcli.stages.usable import finished, roles_of
+from koopcli.stages.roles import finished, roles_of
 from koopcli.store.files import size_text
 from koopcli.vehicles.plants.forces import Forces
 from koopcli.vehicles.plants.plant import PlantChoice

@@ -20,7 +20,7 @@ from koopcli.koopman.scores.metrics import summary
 from koopcli.records import FloatArray, Meta, Trajectories
 from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task, refuse_beyond_memory
 from koopcli.stages.predictors import figures, regression, size
-from koopcli.stages.usable import finished
+from koopcli.stages.roles import finished
 from koopcli.vehicles.plants import remembered_plant
 from koopcli.vehicles.symmetry import images
 

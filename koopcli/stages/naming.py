@@ -16,7 +16,7 @@ from koopcli.simulation.samples.point import PointSample
 from koopcli.simulation.samples.sample import INPUTS
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
-from koopcli.stages.makers import outlook
+from koopcli.stages.fits import outlook
 from koopcli.vehicles.plants.slips import Slips
 
 

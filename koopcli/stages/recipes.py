@@ -16,11 +16,9 @@ from koopcli.records import Meta
 from koopcli.simulation.samples.point import PointSample
 from koopcli.simulation.samples.sample import SampleChoice
 from koopcli.stages.base import Task
-from koopcli.stages.makers import MAKERS
-from koopcli.stages.usable import as_inputs
+from koopcli.stages.roles import as_inputs
 from koopcli.vehicles.plants import PLANTS
 
-FITS = tuple(MAKERS)
 BESIDE = (FitEdmd.of(basis="states"), FitEdmd.of(order=3), FitEdmd.of(order=5))  # of any trajectories, to compare with
 
 

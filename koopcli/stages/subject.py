@@ -12,7 +12,7 @@ from koopcli.config.shipped import Fingerprint, fingerprint
 from koopcli.errors import UnknownNameError
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
-from koopcli.stages.makers import MAKERS, outlook
+from koopcli.stages.fits import FITS, outlook
 
 
 def subject(artefacts: Sequence[Task], simulated: Callable[[Task], Simulate]) -> Subject:
@@ -21,7 +21,7 @@ def subject(artefacts: Sequence[Task], simulated: Callable[[Task], Simulate]) ->
     ``simulated`` finds the simulation behind a predictor whose trajectories are gone.
     """
     steps = list(dict.fromkeys(step for task in artefacts for step in task.upstream()))
-    predictors = [step for step in steps if step.stage in MAKERS]
+    predictors = [step for step in steps if step.stage in FITS]
     vehicles = dict.fromkeys(_simulations(steps, predictors, simulated)) or dict.fromkeys(_samples(steps))
     return Subject(tuple(vehicles), tuple(outlook(one).name for one in predictors))
 

@@ -13,9 +13,9 @@ from koopcli.records import Meta
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 from koopcli.stages.fit_edmd import OF_ONE_RUN
+from koopcli.stages.fits import LIFTED
 from koopcli.stages.lineage import lineage
-from koopcli.stages.makers import LIFTED
-from koopcli.stages.usable import roles_of
+from koopcli.stages.roles import roles_of
 from koopcli.store import Record, Store
 
 LINEAR = FitEdmd.of(basis="total", order=1)
