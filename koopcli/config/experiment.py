@@ -41,7 +41,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Source:
+class Sections:
     """Raw values by section, where they came from, and the folder of relative paths in them."""
 
     values: Mapping[str, Mapping[str, Any]]
@@ -57,7 +57,7 @@ class Source:
 class Experiment:
     """Settings of every stage; :meth:`sample` and :meth:`test` give those that depend on a kind and on the vehicle."""
 
-    sources: tuple[Source, ...]
+    sources: tuple[Sections, ...]
     about: About
     simulate: Simulate
     fit_edmd: FitEdmd
@@ -179,10 +179,10 @@ def load_experiment(name: str, changes: Changes) -> Experiment:
     """The experiment ``name`` (shipped, or a file by its path) with ``changes`` of the command line laid over it."""
     path = locate("experiments", name, "experiment")
     here = from_file(path)
-    return _experiment((Source(_read(path, here), here, path.parent), Source(changes, COMMAND_LINE, Path())))
+    return _experiment((Sections(_read(path, here), here, path.parent), Sections(changes, COMMAND_LINE, Path())))
 
 
-def _experiment(sources: tuple[Source, ...]) -> Experiment:
+def _experiment(sources: tuple[Sections, ...]) -> Experiment:
     """The experiment of ``sources``, of which later ones win."""
     for source in sources:
         for section in source.values:
@@ -225,7 +225,7 @@ def _read(path: Path, here: Origin) -> Changes:
     return content
 
 
-def _vehicle(layers: Sequence[Source]) -> VehicleParameters:
+def _vehicle(layers: Sequence[Sections]) -> VehicleParameters:
     """The vehicle named last, with the single parameters that its own or a later layer changes."""
     vehicle = vehicle_named(DEFAULT_VEHICLE)
     for layer in layers:

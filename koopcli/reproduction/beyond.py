@@ -158,7 +158,7 @@ def pictures(experiment: Experiment) -> list[Picture]:
     return [Picture(draw("frontier", frontier), "Error against simulated seconds."), *pictured]
 
 
-def measure(pipeline: Pipeline, cell: blocks.Cell, task: Task) -> Mapping[str, float]:
+def measure(pipeline: Pipeline, cell: blocks.BeyondCell, task: Task) -> Mapping[str, float]:
     """Seconds of the fit, when it was made, with those of building its lookup, and of predicting all test states, now;
     what it misses of the data.
     """

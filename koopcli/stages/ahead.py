@@ -33,20 +33,20 @@ class Making:
 
 
 @dataclass(frozen=True)
-class Made:
+class Messages:
     """What was ``said`` of each artefact on the way, by name, and what was ``warned`` of."""
 
     said: dict[str, str]
     warned: list[str]
 
 
-def make(making: Making) -> Made:
+def make(making: Making) -> Messages:
     """Make an artefact whose inputs are in the store. Raises ``OtherCodeError`` where other code has asked for it."""
     check_code(making.code)
     heard = _Heard()
     pipeline = Pipeline(Store(making.root, heard.warn), heard)
     pipeline.make(making.task)
-    return Made(pipeline.said, heard.warned)
+    return Messages(pipeline.said, heard.warned)
 
 
 def make_ahead(pipeline: Pipeline, tasks: Iterable[Task]) -> dict[Task, KoopError]:
@@ -72,7 +72,7 @@ def make_ahead(pipeline: Pipeline, tasks: Iterable[Task]) -> dict[Task, KoopErro
     return failed
 
 
-def _each(pipeline: Pipeline, missing: list[Task], failed: dict[Task, KoopError]) -> Iterator[Made]:
+def _each(pipeline: Pipeline, missing: list[Task], failed: dict[Task, KoopError]) -> Iterator[Messages]:
     """Make ``missing``, each as soon as its inputs are there; what depends on one that ``failed`` is not begun."""
     lacked = set(missing)
     lacking = {task: {one for _, one in task.inputs if one in lacked} for task in missing}
@@ -81,7 +81,7 @@ def _each(pipeline: Pipeline, missing: list[Task], failed: dict[Task, KoopError]
         for one in inputs:
             waiting.setdefault(one, []).append(task)
     ready = deque(task for task, inputs in lacking.items() if not inputs)
-    running: dict[Future[Made], Task] = {}
+    running: dict[Future[Messages], Task] = {}
     root = pipeline.store.root.absolute()
     while ready or running:
         while ready and len(running) < pipeline.workers.width:

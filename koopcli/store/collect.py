@@ -19,7 +19,7 @@ from koopcli.progress import Progress, silent
 from koopcli.store.files import DAY, HOUR, make_folder, own_name, storage_errors
 from koopcli.store.locks import if_free
 from koopcli.store.store import Store
-from koopcli.store.survey import DIGEST, File, Recorded, Survey, look, object_path, pinned, records, survey
+from koopcli.store.survey import DIGEST, File, Recorded, Stock, look, object_path, pinned, records, survey
 from koopcli.text import printable
 
 NAMES = re.compile(rf"(?<![0-9a-f]){DIGEST}(?![0-9a-f])".encode())
@@ -41,12 +41,12 @@ class Removal:
 
 
 @dataclass(frozen=True)
-class Plan:
+class CollectionPlan:
     """What a collection removes; ``kept`` artefacts stay. ``clock`` says how the age of files was measured."""
 
     removals: tuple[Removal, ...]
     kept: int
-    there: Survey = field(repr=False)
+    there: Stock = field(repr=False)
     clock: str = ""
 
     @property
@@ -55,7 +55,7 @@ class Plan:
         return sum(one.size for one in self.removals)
 
 
-def plan(store: Store, grace: float, *, delete: bool = False, progress: Progress = silent) -> Plan:
+def plan(store: Store, grace: float, *, delete: bool = False, progress: Progress = silent) -> CollectionPlan:
     """What is neither pinned nor younger than ``grace`` seconds, nor was used to make any such thing.
 
     Raises ``DamagedArtefactError`` for a damaged pin, as nobody knows what it keeps.
@@ -68,7 +68,7 @@ def plan(store: Store, grace: float, *, delete: bool = False, progress: Progress
             f"koop unpin {damaged[0]}, and pin again what is to stay"
         )
     if not any((there.objects, there.removing, there.records, there.chunks, there.locks, there.temporary)):
-        return Plan((), 0, there)
+        return CollectionPlan((), 0, there)
     now, clock = _clock(store, there, delete)
     kept = _kept(there, now - grace)
     removals = [
@@ -85,10 +85,10 @@ def plan(store: Store, grace: float, *, delete: bool = False, progress: Progress
             if now - file.mtime >= max(grace, HOUR) and _free(file.path)
         ),
     ]
-    return Plan(tuple(removals), len(kept), there, clock)
+    return CollectionPlan(tuple(removals), len(kept), there, clock)
 
 
-def remove(store: Store, planned: Plan, progress: Progress = silent) -> list[Removal]:
+def remove(store: Store, planned: CollectionPlan, progress: Progress = silent) -> list[Removal]:
     """Remove what was planned, but for what is wanted or in use meanwhile; returns what was removed."""
     done: list[Removal] = []
     waiting: list[Removal] = []
@@ -112,7 +112,7 @@ def remove(store: Store, planned: Plan, progress: Progress = silent) -> list[Rem
     return done
 
 
-def _kept(there: Survey, before: float) -> set[str]:
+def _kept(there: Stock, before: float) -> set[str]:
     """Full names of what is pinned or young, and of all that it was made from. What does not read here is kept.
 
     What was made again is as young as its object, whatever the age of its record.
@@ -147,7 +147,7 @@ def _named(one: Recorded) -> set[str]:
     return {text.decode() for text in NAMES.findall(one.text)}
 
 
-def _artefacts(store: Store, there: Survey, kept: set[str], before: float) -> Iterator[Removal]:
+def _artefacts(store: Store, there: Stock, kept: set[str], before: float) -> Iterator[Removal]:
     """Records that nobody keeps, each with its object once no other record names it; then objects without any."""
     wanted = {digest for full in kept for digest in _named(there.records[full])}
     freed: set[str] = set()
@@ -168,14 +168,14 @@ def _artefacts(store: Store, there: Survey, kept: set[str], before: float) -> It
             yield Removal("orphan object", _relative(store, file), file.size, (file,), (digest,))
 
 
-def _unfinished(store: Store, there: Survey, before: float) -> Iterator[Removal]:
+def _unfinished(store: Store, there: Stock, before: float) -> Iterator[Removal]:
     """Chunks of what nobody has gone on with."""
     for key, files in there.chunks.items():
         if all(file.mtime <= before for file in files) and _free(store.root / "locks" / f"{key}.lock"):
             yield Removal("chunks", f"partial/{key}", sum(file.size for file in files), tuple(files), key=key)
 
 
-def _clock(store: Store, there: Survey, delete: bool) -> tuple[float, str]:
+def _clock(store: Store, there: Stock, delete: bool) -> tuple[float, str]:
     """Now, by the file system that gave the files their times, and how it was found where not in the usual way."""
     temporary = store.root / "tmp"
     probe = temporary / own_name()
@@ -193,7 +193,7 @@ def _clock(store: Store, there: Survey, delete: bool) -> tuple[float, str]:
         return there.newest(), "the store is read-only: ages are counted from the newest file in it"
 
 
-def _remove_record(store: Store, one: Removal, there: Survey) -> bool:
+def _remove_record(store: Store, one: Removal, there: Stock) -> bool:
     """Remove the record of an artefact, unless it was pinned, made again or used meanwhile."""
     pins = pinned(store.root)
     (file,) = one.files
@@ -234,7 +234,7 @@ def _remove_files(store: Store, one: Removal) -> bool:
     return free
 
 
-def _remove_objects(store: Store, digests: set[str], there: Survey) -> set[str]:
+def _remove_objects(store: Store, digests: set[str], there: Stock) -> set[str]:
     """Remove objects that no record names; returns those that are still there."""
     away: dict[str, Path] = {}
     suffix = own_name()
@@ -249,7 +249,7 @@ def _remove_objects(store: Store, digests: set[str], there: Survey) -> set[str]:
     return {digest for digest in digests if object_path(store.root, digest).exists()}
 
 
-def _untouched(store: Store, digest: str, there: Survey) -> bool:
+def _untouched(store: Store, digest: str, there: Stock) -> bool:
     """Whether an object is as it was when it was looked at; one that somebody has put again is young."""
     try:
         about = object_path(store.root, digest).lstat()
@@ -272,7 +272,7 @@ def _settle(store: Store, away: dict[str, Path]) -> None:
                 aside.unlink()
 
 
-def _put_back(store: Store, there: Survey) -> None:
+def _put_back(store: Store, there: Stock) -> None:
     """End what a collection that was cut off had begun; one that is still at work meets nothing it does not expect."""
     for digest, file in there.removing:
         _settle(store, {digest: file.path})

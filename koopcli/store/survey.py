@@ -52,7 +52,7 @@ class Recorded:
 
 
 @dataclass
-class Survey:
+class Stock:
     """Every file of a store by what it is, as its name says."""
 
     objects: dict[str, File] = field(default_factory=dict)
@@ -80,9 +80,9 @@ class Survey:
         return max((file.mtime for file in files), default=0.0)
 
 
-def survey(root: Path, progress: Progress = silent) -> Survey:
+def survey(root: Path, progress: Progress = silent) -> Stock:
     """Everything in the store at ``root``. Objects come before records: what is committed meanwhile is not missed."""
-    found = Survey()
+    found = Stock()
     with reading_errors(root):
         for entry in _entries(root, top=True):
             if entry.name not in BESIDE and not (entry.name in FOLDERS and entry.is_dir(follow_symlinks=False)):
@@ -167,7 +167,7 @@ def _pin(path: Path) -> list[str] | None:
         return None
 
 
-def _objects(root: Path, found: Survey) -> None:
+def _objects(root: Path, found: Stock) -> None:
     for folder in _entries(root / "objects"):
         if not folder.is_dir(follow_symlinks=False):
             _add(found.foreign, folder)

@@ -14,7 +14,7 @@ from koopcli.store.files import HOUR, UntrustedFileError, open_regular, size_tex
 from koopcli.store.names import short_name
 from koopcli.store.records import Record
 from koopcli.store.store import Store
-from koopcli.store.survey import Recorded, Survey, object_path, survey
+from koopcli.store.survey import Recorded, Stock, object_path, survey
 
 DAMAGE = (
     "damaged record",
@@ -73,7 +73,7 @@ def verify(store: Store, opens: Opens | None, progress: Progress = silent) -> Re
     return Report(len(there.records), objects.read, len(there.chunks), len(there.quarantine), tuple(findings))
 
 
-def _records(store: Store, there: Survey) -> Iterator[Finding]:
+def _records(store: Store, there: Stock) -> Iterator[Finding]:
     for full, one in there.records.items():
         path = _relative(store, one.file.path)
         if one.record is None and one.damaged:
@@ -89,7 +89,7 @@ def _records(store: Store, there: Survey) -> Iterator[Finding]:
 @dataclass
 class _Objects:
     store: Store
-    there: Survey
+    there: Stock
     opens: Opens | None
     progress: Progress
     read: int = 0
@@ -151,7 +151,7 @@ class _Objects:
         return "orphan object", f"{size_text(size)} that no record names: see koop gc"
 
 
-def _pins(store: Store, there: Survey) -> Iterator[Finding]:
+def _pins(store: Store, there: Stock) -> Iterator[Finding]:
     for label, names in there.pins.items():
         path = f"refs/{label}.json"
         if names is None:
@@ -162,7 +162,7 @@ def _pins(store: Store, there: Survey) -> Iterator[Finding]:
                 yield Finding("pin of nothing", path, what, name)
 
 
-def _beside(store: Store, there: Survey) -> Iterator[Finding]:
+def _beside(store: Store, there: Stock) -> Iterator[Finding]:
     """What is no artefact: litter, chunks of what is finished, and what nobody here has written."""
     users = there.named_by()
     finished = {one.key: one.full for digest in users.keys() & there.objects.keys() for one in users[digest]}
