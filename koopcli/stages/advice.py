@@ -185,6 +185,6 @@ def _wheels(case: Case) -> Better | None:
 RULES = {"forces": _forces, "slips": _slips, "wheels": _wheels}
 
 
-def _same_fit(one: FitEdmd, other: FitEdmd) -> bool:
+def _same_fit(a: FitEdmd, b: FitEdmd) -> bool:
     """Whether two fits have the same functions and terms."""
-    return (one.basis, one.terms) == (other.basis, other.terms)
+    return (a.basis, a.terms) == (b.basis, b.terms)
