@@ -170,10 +170,10 @@ def beside(experiment: Experiment) -> Iterator[Row]:
 def ablation(experiment: Experiment) -> Iterator[Row]:
     """The best predictor with one ingredient less, named by what is there instead."""
     best, states = best_fit(experiment).but(trust=False), greedy(experiment)  # which moves no prediction
-    known = round(best.tabulate / experiment.simulate.dt) - round(
+    samples = round(best.tabulate / experiment.simulate.dt) - round(
         (written(best)["horizon"] or HORIZON) / experiment.simulate.dt
     )
-    shorter = best.but(rounds=0, tabulate=known * experiment.simulate.dt)
+    shorter = best.but(rounds=0, tabulate=samples * experiment.simulate.dt)
     less: list[tuple[str, SampleChoice, FitEigen]] = [
         ("rates: lattice", states, best.but(eigenvalues="dmd")),
         ("lift: linear", states, best.but(lift="linear")),

@@ -32,7 +32,7 @@ class ClaimCommand:
             told += ["--set", f"{name}={value}"]
         for change in run.changes:
             name = change.partition("=")[0]
-            kept = name in self.keeps or name.startswith(tuple(one for one in self.keeps if one.endswith(".")))
+            kept = name in self.keeps or name.startswith(tuple(start for start in self.keeps if start.endswith(".")))
             if name not in self.sets and kept:
                 told += ["--set", change]
         return shlex.join(["koop", *self.words, *told])

@@ -211,9 +211,9 @@ def _others(edmd: Edmd) -> Iterator[tuple[EdmdCell, Task]]:
 def _settings(edmd: Edmd) -> Iterator[tuple[EdmdCell, Task]]:
     """Assumptions the paper leaves open, and how the textbook's regression fares."""
     experiment, first = edmd.experiment, edmd.first
-    other = Forces("axle" if experiment.plant_for(Forces) == Forces("wheel") else "wheel")
-    elsewhere = Edmd(replace(experiment, simulate=replace(experiment.simulate, plant=other)))
-    yield from _row(elsewhere, PER_WHEEL, f"force per {other.force_per}", first, edmd.best)
+    forces = Forces("axle" if experiment.plant_for(Forces) == Forces("wheel") else "wheel")
+    elsewhere = Edmd(replace(experiment, simulate=replace(experiment.simulate, plant=forces)))
+    yield from _row(elsewhere, PER_WHEEL, f"force per {forces.force_per}", first, edmd.best)
     side = round(edmd.box.count ** (1 / 3))
     label = f"{side}³ test states on a grid"
     yield from _row(edmd, TEST_GRID, label, first, edmd.best, layout="product", count=side**3)
