@@ -44,14 +44,14 @@ class Joined:
         """The rows of a slice of step one, from the parts that hold them."""
         first, rest = _split(index)
         start, stop, _ = slice(first.start, first.stop).indices(self.shape[0])
-        found = []
+        blocks = []
         i = bisect_right(self._ends, start)
         while start < stop:
             before = self._ends[i] - self._parts[i].shape[0]
             until = min(stop, self._ends[i])
-            found.append(self._parts[i][(slice(start - before, until - before), *rest)])
+            blocks.append(self._parts[i][(slice(start - before, until - before), *rest)])
             start, i = until, i + 1
-        return np.concatenate(found) if found else np.asarray(self._parts[0][(slice(0, 0), *rest)])
+        return np.concatenate(blocks) if blocks else np.asarray(self._parts[0][(slice(0, 0), *rest)])
 
 
 class Chosen:

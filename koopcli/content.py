@@ -55,7 +55,7 @@ def shown(value: Any) -> str:
         return f"{type(value).__name__}(…)"
     if isinstance(value, Mapping):
         return f"{{{len(value)} facts}}"
-    if isinstance(value, (list, tuple)) and any(_is_array(one) or isinstance(one, Content) for one in value):
+    if isinstance(value, (list, tuple)) and any(_is_array(item) or isinstance(item, Content) for item in value):
         return f"({', '.join(map(shown, value))})"
     text = repr(value)
     return text if len(text) <= SHOWN else f"{text[: SHOWN - 1]}…"

@@ -183,14 +183,14 @@ class Course(Content):
 
     def pack(self) -> dict[str, Array]:
         """The arrays for storage."""
-        found = {f.name: Array(getattr(self, f.name), ("trajectory",), "1") for f in fields(self)}
-        return {f"course/{name}": array for name, array in found.items()}
+        arrays = {f.name: Array(getattr(self, f.name), ("trajectory",), "1") for f in fields(self)}
+        return {f"course/{name}": array for name, array in arrays.items()}
 
     @classmethod
     def unpack(cls, arrays: Mapping[str, Array]) -> Course | None:
         """The inverse of :meth:`pack`; None where there is none."""
-        found = {name.partition("/")[2]: a.values[...] for name, a in arrays.items() if name.startswith("course/")}
-        return cls(**found) if found else None
+        values = {name.partition("/")[2]: a.values[...] for name, a in arrays.items() if name.startswith("course/")}
+        return cls(**values) if values else None
 
 
 ENDS = (
@@ -302,5 +302,5 @@ def join(parts: Sequence[Trajectories]) -> Trajectories:
     if len(parts) == 1:
         return parts[0]
     courses = [part.course for part in parts if part.course is not None]
-    course = Course(*(np.concatenate([getattr(one, f.name) for one in courses]) for f in fields(Course)))
+    course = Course(*(np.concatenate([getattr(part, f.name) for part in courses]) for f in fields(Course)))
     return replace(parts[0], x=Joined([p.x for p in parts]), u=Joined([p.u for p in parts]), course=course)

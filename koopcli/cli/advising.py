@@ -32,21 +32,21 @@ def advice(typed: Typed, call: Invocation, evaluation: Task, figures: Meta) -> s
     case = case_of(evaluation, figures)
     if case is None:
         return None
-    found = advise(case)
-    if found.own_test:
+    advice = advise(case)
+    if advice.own_test:
         return (
-            f"{found.why}. Try: {_line(['koop', 'evaluate', *typed.only('predictor'), *typed.but('predictor', 'on')])}"
+            f"{advice.why}. Try: {_line(['koop', 'evaluate', *typed.only('predictor'), *typed.but('predictor', 'on')])}"
         )
-    if not found.page:
-        return f"{found.why}."
-    if found.better is None:
-        return f"{found.why}. No setting of koop is known to beat the baseline here: see {found.page}"
-    command = _short(typed, call, evaluation, found.better) or _nested(typed, call, evaluation, found.better)
+    if not advice.page:
+        return f"{advice.why}."
+    if advice.better is None:
+        return f"{advice.why}. No setting of koop is known to beat the baseline here: see {advice.page}"
+    command = _short(typed, call, evaluation, advice.better) or _nested(typed, call, evaluation, advice.better)
     if command is None:
-        return f"{found.why}; see {found.page} for what does better"
-    gain = found.better.gain
+        return f"{advice.why}; see {advice.page} for what does better"
+    gain = advice.better.gain
     measured = f"measured on {gain.vehicle} to turn {gain.before:.3g} % into {gain.after:.3g} %"
-    return f"{found.why}. Try this, {measured}: {command}"
+    return f"{advice.why}. Try this, {measured}: {command}"
 
 
 @dataclass(frozen=True)
@@ -58,15 +58,15 @@ class Typed:
     @classmethod
     def of(cls, context: typer.Context) -> Typed:
         """What was typed of the command that runs, but for what says what to print."""
-        found = {}
+        words = {}
         for parameter in context.command.params:
             name = str(parameter.name)
             value = context.params.get(name)
             if name not in OUTPUTS and value not in (None, False, [], (), parameter.default):
                 option = [] if parameter.param_type_name == "argument" else parameter.opts[:1]
                 values = value if isinstance(value, (list, tuple)) else [value]
-                found[name] = tuple(word for one in values for word in (*option, str(one)))
-        return cls(found)
+                words[name] = tuple(word for item in values for word in (*option, str(item)))
+        return cls(words)
 
     @property
     def experiment(self) -> str:
@@ -124,7 +124,7 @@ def _nested(typed: Typed, call: Invocation, evaluation: Task, better: Better) ->
     """The command line with another predictor, made by a command inside it; None where its settings cannot be said."""
     from koopcli.config.words import plant_words, sample_words, vehicle_words
     from koopcli.stages import recipes
-    from koopcli.stages.usable import roles_of
+    from koopcli.stages.roles import roles_of
 
     inputs = dict(evaluation.input("predictor").inputs)
     data = [inputs[role] for role in roles_of(inputs)]
@@ -165,8 +165,8 @@ def _does(fit: Task, call: Invocation, evaluation: Task, better: Better) -> bool
     """Whether a predictor can be made and scored, is of the plant and vehicle at hand, and covers states as fast."""
     from koopcli.stages import recipes
 
-    known = next(task for task in evaluation.input("predictor").upstream() if task.stage == "simulate")
-    mine, theirs = (task.ancestor("simulate") for task in (fit, known))
+    simulation = next(task for task in evaluation.input("predictor").upstream() if task.stage == "simulate")
+    mine, theirs = (task.ancestor("simulate") for task in (fit, simulation))
     for name in ("plant", "vehicle", "dt"):
         if getattr(mine.settings, name) != getattr(theirs.settings, name):
             return False

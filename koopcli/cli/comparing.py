@@ -50,22 +50,22 @@ def diff(
     (name_a, record_a, packed_a), (name_b, record_b, packed_b) = (_open(text, shelf, console) for text in (one, other))
     settings = _settings(record_a, record_b, shelf) if record_a is not None and record_b is not None else {}
     with console.progress("diff") as progress:
-        found = compare(packed_a, packed_b, rtol, progress)
+        comparison = compare(packed_a, packed_b, rtol, progress)
     if as_json:
         print_json(
             {
                 "a": name_a,
                 "b": name_b,
                 "rtol": rtol,
-                "equal": found.equal,
+                "equal": comparison.equal,
                 "settings": {name: list(pair) for name, pair in settings.items()},
-                "arrays": {array.name: _described(array) for array in found.arrays},
-                "facts": {name: list(pair) for name, pair in found.facts.items()},
+                "arrays": {array.name: _described(array) for array in comparison.arrays},
+                "facts": {name: list(pair) for name, pair in comparison.facts.items()},
             }
         )
         return
-    _show(name_a, name_b, settings, found)
-    print(f"equal within {rtol:g}" if found.equal else f"different: {_what(found)}")
+    _show(name_a, name_b, settings, comparison)
+    print(f"equal within {rtol:g}" if comparison.equal else f"different: {_what(comparison)}")
 
 
 def _open(text: str, shelf: Store, console: Console) -> tuple[str, Record | None, Packed]:
@@ -100,17 +100,17 @@ def _settings(a: Record, b: Record, shelf: Store) -> Pairs:
     from koopcli.stages.compare import differing
     from koopcli.stages.lineage import lineage
 
-    here, there = (dict(lineage(one, shelf).behind()) for one in (a, b))
-    found: Pairs = {}
-    for role in dict.fromkeys([*here, *there]):
-        x, y = here.get(role), there.get(role)
+    behind_a, behind_b = (dict(lineage(record, shelf).behind()) for record in (a, b))
+    pairs: Pairs = {}
+    for role in dict.fromkeys([*behind_a, *behind_b]):
+        x, y = behind_a.get(role), behind_b.get(role)
         before = f"{role}: " if role else ""
         if x is None or y is None or x.stage != y.stage:
-            found[f"{before}stage"] = (x.stage if x else None, y.stage if y else None)
+            pairs[f"{before}stage"] = (x.stage if x else None, y.stage if y else None)
             continue
-        first, second = ({**one.recipe["settings"], "version": one.recipe["version"]} for one in (x, y))
-        found |= {f"{before}{x.stage}.{name}": pair for name, pair in differing(first, second).items()}
-    return found
+        first, second = ({**record.recipe["settings"], "version": record.recipe["version"]} for record in (x, y))
+        pairs |= {f"{before}{x.stage}.{name}": pair for name, pair in differing(first, second).items()}
+    return pairs
 
 
 def _described(array: Difference) -> dict[str, Any]:
@@ -125,8 +125,8 @@ def _described(array: Difference) -> dict[str, Any]:
     }
 
 
-def _show(name_a: str, name_b: str, settings: Pairs, found: Comparison) -> None:
-    for title, pairs in (("settings", settings), ("facts", found.facts)):
+def _show(name_a: str, name_b: str, settings: Pairs, comparison: Comparison) -> None:
+    for title, pairs in (("settings", settings), ("facts", comparison.facts)):
         if pairs:
             rows = [[name, _short(a), _short(b)] for name, (a, b) in pairs.items()]
             show_table([f"{title} that differ", f"A: {name_a}", f"B: {name_b}"], rows, left=3)
@@ -138,14 +138,14 @@ def _show(name_a: str, name_b: str, settings: Pairs, found: Comparison) -> None:
             *("" if value is None else f"{value:.3g}" for value in (array.largest, array.relative)),
             f"{array.beyond:,}",
         ]
-        for array in found.arrays
+        for array in comparison.arrays
     ]
     show_table(["array", "shape", "A | B", "largest |a − b|", "relative", "values beyond R"], rows, left=3)
 
 
-def _what(found: Comparison) -> str:
-    unequal = sum(not array.equal for array in found.arrays)
-    return f"{unequal} of {len(found.arrays)} arrays, {len(found.facts)} facts"
+def _what(comparison: Comparison) -> str:
+    unequal = sum(not array.equal for array in comparison.arrays)
+    return f"{unequal} of {len(comparison.arrays)} arrays, {len(comparison.facts)} facts"
 
 
 def _short(value: object) -> str:

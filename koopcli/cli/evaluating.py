@@ -73,10 +73,10 @@ def evaluate(
     scored = {name: given.pop(name) for name in ("restart",) if name in given}
     changes: Changes = {"test": given, "evaluate": scored, "vehicle": {"name": vehicle}}
     call = begin(store, experiment, set_, (*DATA, *FITS, *TEST), changes, workers, cluster)
-    from koopcli.stages import recipes
+    from koopcli.stages import fits, recipes
     from koopcli.stages.verdict import beside
 
-    of = call.optional(predictor, recipes.FITS, "the PREDICTOR", TEST)
+    of = call.optional(predictor, tuple(fits.FITS), "the PREDICTOR", TEST)
     elsewhere = [section for section in call.changes if section != "test"]
     test = call.optional(on, ["simulate"], "--on", elsewhere)
 
@@ -114,25 +114,25 @@ def _judge(call: Invocation, typed: Typed, task: Task, artefact: Artefact, other
         return about
     quiet = Pipeline(call.pipeline.store, _Unwarned(call.console), call.pipeline.workers)
     names, figures = {}, {}
-    for name, other in others.items():
-        one = quiet.make(other)
-        names[name], figures[name] = one.record.name, one.figures
-        del one  # its scores may be many
+    for name, baseline in others.items():
+        scored = quiet.make(baseline)
+        names[name], figures[name] = scored.record.name, scored.figures
+        del scored  # its scores may be many
     rows = [["this predictor", *_scores(artefact.figures)]]
-    rows += [[NAMES[name], *_scores(found)] for name, found in figures.items()]
+    rows += [[NAMES[name], *_scores(values)] for name, values in figures.items()]
     header = ["RMSE in %", "mean ± std", "median", "max", "re-lifted", "inside"]
     show_table(header, rows, file=sys.stderr)
     for segment in artefact.figures.get("segments", []):
         call.console.note(f"from sample {segment['start']:>4}: RMSE {segment['rmse']:.4g} %")
-    found = verdict(artefact.figures, figures)
-    (call.console.note if found.beats else call.console.warn)(found.text)
+    judgement = verdict(artefact.figures, figures)
+    (call.console.note if judgement.beats else call.console.warn)(judgement.text)
     told = None
-    if not found.beats and not about["fitted_to_test_data"]:
+    if not judgement.beats and not about["fitted_to_test_data"]:
         told = advice(typed, call, task, artefact.figures)
     if told is not None:
         call.console.note(told)
     scores = {name: {"name": names[name], "rmse": figures[name]["rmse"]} for name in others}
-    return {**about, "baselines": scores, "beats_baselines": found.beats, "verdict": found.text, "advice": told}
+    return {**about, "baselines": scores, "beats_baselines": judgement.beats, "verdict": judgement.text, "advice": told}
 
 
 def _scores(figures: dict[str, Any]) -> list[str]:

@@ -61,9 +61,9 @@ class Invocation:
         """The simulation behind ``predictor``, which remembers it when its trajectories are gone."""
         from koopcli.stages.recipes import remembered_simulation
 
-        known = predictor.find("simulate")
-        if known is not None:
-            settings: Simulate = known.settings
+        simulation = predictor.find("simulate")
+        if simulation is not None:
+            settings: Simulate = simulation.settings
             return settings
         content = self.pipeline.make(predictor).content
         return remembered_simulation(content.plant, content.dt)
@@ -80,8 +80,8 @@ class Invocation:
         """Note where the vehicle that was named makes the same as another would."""
         from koopcli.stages.vehicle import makes_the_same
 
-        if said := makes_the_same(self.experiment, tasks):
-            self.console.note(said)
+        if text := makes_the_same(self.experiment, tasks):
+            self.console.note(text)
 
     def run(
         self,
@@ -102,11 +102,11 @@ class Invocation:
         self.refuse_idle(lambda experiment: [make(experiment)], [task])
         self.say_what_vehicle([task])
         if dry_run:
-            steps = {step.task: step for one in (task, *also) for step in self.pipeline.plan(one)}
+            steps = {step.task: step for wanted in (task, *also) for step in self.pipeline.plan(wanted)}
             show_plan(list(steps.values()), as_json=as_json)
             return
-        for one in also:
-            self.pipeline.check(one)
+        for wanted in also:
+            self.pipeline.check(wanted)
         self.console.note(f"store: {self.pipeline.store.root}")
         with self.pipeline.workers:
             artefact = self.pipeline.make(task)

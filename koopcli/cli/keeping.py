@@ -47,7 +47,7 @@ def verify(
     with console.progress("verify") as progress:
         report = verify(shelf, None if fast else opens, progress)
     findings = repair(shelf, console, report.findings) if mend else list(report.findings)
-    left = [one for one in findings if one.damage and not one.repaired]
+    left = [finding for finding in findings if finding.damage and not finding.repaired]
     if as_json:
         rows = [
             {"kind": f.kind, "name": f.name, "path": f.path, "what": f.what, "damage": f.damage, "repaired": f.repaired}
@@ -61,7 +61,7 @@ def verify(
             header = ["finding", "artefact", "file", "what", "repaired"]
             show_table(header, table, left=5)
         read = "sizes only" if fast else f"{size_text(report.read)} read"
-        mended = sum(one.repaired for one in findings)
+        mended = sum(finding.repaired for finding in findings)
         state = f"{len(left)} damaged" if left else "nothing is damaged"
         print(f"{report.checked} artefacts, {read}: {f'{mended} repaired, ' if mended else ''}{state}")
         if report.unfinished or report.quarantine:
@@ -101,22 +101,22 @@ def gc(
         console.note(f"store: {shelf.root}")
     with console.progress("gc") as progress:
         planned = plan(shelf, grace * DAY, delete=delete, progress=progress)
-        found = remove(shelf, planned, progress) if delete else list(planned.removals)
+        removals = remove(shelf, planned, progress) if delete else list(planned.removals)
     if planned.clock:
         console.warn(planned.clock)
-    size = sum(one.size for one in found)
+    size = sum(removal.size for removal in removals)
     if as_json:
-        rows = [{"kind": one.kind, "name": one.name, "bytes": one.size} for one in found]
+        rows = [{"kind": removal.kind, "name": removal.name, "bytes": removal.size} for removal in removals]
         print_json({"remove": rows, "bytes": size, "kept": planned.kept, "deleted": delete})
         return
-    if found:
-        table = [[one.name, one.kind, size_text(one.size)] for one in found]
+    if removals:
+        table = [[removal.name, removal.kind, size_text(removal.size)] for removal in removals]
         show_table(["removed" if delete else "would remove", "kind", "frees"], table, left=2)
     done = "removed" if delete else "to remove"
-    print(f"{done}: {len(found)} ({size_text(size)}); artefacts kept: {planned.kept}")
+    print(f"{done}: {len(removals)} ({size_text(size)}); artefacts kept: {planned.kept}")
     if planned.there.quarantine:
         console.note(f"{len(planned.there.quarantine)} damaged files in {shelf.root / 'quarantine'} stay there")
-    if found and not delete:
+    if removals and not delete:
         console.note("nothing was removed: koop gc --delete does it")
 
 

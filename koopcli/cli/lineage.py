@@ -21,51 +21,53 @@ def show_lineage(name: str, store: Path | None, as_json: bool) -> None:
     from koopcli.stages.lineage import lineage
 
     console, shelf = open_store(store)
-    found = lineage(shelf.find(name), shelf)
+    ancestor = lineage(shelf.find(name), shelf)
     if as_json:
-        print_json(_described(found))
+        print_json(_described(ancestor))
         return
     console.note(f"store: {shelf.root}")
     from rich.console import Console
     from rich.tree import Tree
 
-    tree = Tree(_label(found))
-    _grow(tree, found)
+    tree = Tree(_label(ancestor))
+    _grow(tree, ancestor)
     Console(file=sys.stdout, width=None if sys.stdout.isatty() else UNCUT).print(tree)
 
 
-def _grow(tree: Tree, one: Ancestor) -> None:
-    for inner in one.inputs:
+def _grow(tree: Tree, ancestor: Ancestor) -> None:
+    for inner in ancestor.inputs:
         _grow(tree.add(_label(inner)), inner)
 
 
-def _label(one: Ancestor) -> Any:
+def _label(ancestor: Ancestor) -> Any:
     from rich.text import Text
 
     from koopcli.store.files import size_text
     from koopcli.text import printable
 
-    words = [_name(one)]
-    if one.record is not None:
-        words.append(size_text(one.record.size) if one.state == "present" else one.state)
-        words.append(brief(dict(one.record.recipe["settings"])))
+    words = [_name(ancestor)]
+    if ancestor.record is not None:
+        words.append(size_text(ancestor.record.size) if ancestor.state == "present" else ancestor.state)
+        words.append(brief(dict(ancestor.record.recipe["settings"])))
     else:
-        words.append(one.state)
-    return Text(printable("  ".join([f"{one.role}: {words[0]}" if one.role else words[0], *words[1:]]).rstrip()))
+        words.append(ancestor.state)
+    return Text(
+        printable("  ".join([f"{ancestor.role}: {words[0]}" if ancestor.role else words[0], *words[1:]]).rstrip())
+    )
 
 
-def _described(one: Ancestor) -> dict[str, Any]:
-    known = one.record
-    about = {"bytes": known.size, "settings": known.recipe["settings"]} if known is not None else {}
+def _described(ancestor: Ancestor) -> dict[str, Any]:
+    record = ancestor.record
+    about = {"bytes": record.size, "settings": record.recipe["settings"]} if record is not None else {}
     return {
-        "name": _name(one),
-        "state": one.state,
+        "name": _name(ancestor),
+        "state": ancestor.state,
         **about,
-        "inputs": {inner.role: _described(inner) for inner in one.inputs},
+        "inputs": {inner.role: _described(inner) for inner in ancestor.inputs},
     }
 
 
-def _name(one: Ancestor) -> str:
+def _name(ancestor: Ancestor) -> str:
     from koopcli.store.names import short_name
 
-    return short_name(one.full)
+    return short_name(ancestor.full)

@@ -92,8 +92,10 @@ def _why_stale(records: Sequence[Record]) -> dict[str, tuple[str, bool]]:
     from koopcli.stages import stale as staleness
 
     by_name = {f"{record.stage}/{record.key}": record for record in records}
-    found = {name: (said, True) for name, one in by_name.items() if (said := staleness.other_code(one)) is not None}
-    return found | {name: (said, False) for name, said in staleness.stale(by_name).items()}
+    by_other_code = {
+        name: (text, True) for name, record in by_name.items() if (text := staleness.other_code(record)) is not None
+    }
+    return by_other_code | {name: (text, False) for name, text in staleness.stale(by_name).items()}
 
 
 def _list(rows: Sequence[dict[str, Any]], why: str, title: str = "") -> None:
@@ -201,22 +203,22 @@ def unpin(
     from koopcli.store import pins
 
     console, shelf = open_store(store)
-    known = pins.pins(shelf)
-    label = name if name in known else pins.label_of(shelf.find(name))
+    pinned = pins.pins(shelf)
+    label = name if name in pinned else pins.label_of(shelf.find(name))
     pins.unpin(shelf, label)
     console.note(f"unpinned {label}")
 
 
 def _records(shelf: Store, stage: str | None, console: Console) -> list[Record]:
     """The records of the store, oldest first; those of a newer format are named and left out."""
-    found = []
-    for one, key in shelf.index():
-        if stage in (None, one):
+    records = []
+    for made_by, key in shelf.index():
+        if stage in (None, made_by):
             try:
-                found.append(shelf.record(one, key))
+                records.append(shelf.record(made_by, key))
             except NewerFormatError as error:
                 console.warn(str(error))
-    return sorted((r for r in found if r is not None), key=lambda r: (_time(r), r.stage, r.key))
+    return sorted((r for r in records if r is not None), key=lambda r: (_time(r), r.stage, r.key))
 
 
 def _time(record: Record) -> str:

@@ -120,12 +120,12 @@ def _compare(call: Invocation, artefact: Artefact, usual: list[Task]) -> dict[st
         return {}
     from koopcli.simulation.reference import difference
 
-    other = call.pipeline.make(usual[0])
-    found = difference(other.content, artefact.content)
-    rows = [[name, unit, f"{largest:.3g}", f"{root:.3g}"] for name, unit, largest, root in found]
+    compared = call.pipeline.make(usual[0])
+    differences = difference(compared.content, artefact.content)
+    rows = [[name, unit, f"{largest:.3g}", f"{root:.3g}"] for name, unit, largest, root in differences]
     show_table(["usual − reference", "unit", "largest", "root mean square"], rows, left=2, file=sys.stderr)
-    off = {name: {"max": largest, "rms": root, "unit": unit} for name, unit, largest, root in found}
-    return {"compared": other.record.name, "difference": off}
+    off = {name: {"max": largest, "rms": root, "unit": unit} for name, unit, largest, root in differences}
+    return {"compared": compared.record.name, "difference": off}
 
 
 def register(app: typer.Typer) -> None:

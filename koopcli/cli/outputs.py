@@ -31,9 +31,9 @@ def image_format(output: Path | None) -> ImageFormat:
     if output is None:
         return "png"
     ending = output.suffix.lower().lstrip(".")
-    for known in get_args(ImageFormat):
-        if ending == known:
-            return known  # type: ignore[no-any-return]
+    for image in get_args(ImageFormat):
+        if ending == image:
+            return image  # type: ignore[no-any-return]
     raise InvalidValueError(f"{output}: unknown ending; write to a file ending in .{', .'.join(get_args(ImageFormat))}")
 
 

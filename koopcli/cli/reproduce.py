@@ -109,9 +109,9 @@ def reproduce(
     try:
         with call.pipeline.workers:
             make_ahead(call.pipeline, [*everything, *racing])
-            for one in chosen:
-                done = [report.run_cells(plan, call.pipeline) for plan in plans[one.name]]
-                parts.append(opening.Part(one, done, illustrate(plans[one.name], call.pipeline)))
+            for selected in chosen:
+                done = [report.run_cells(plan, call.pipeline) for plan in plans[selected.name]]
+                parts.append(opening.Part(selected, done, illustrate(plans[selected.name], call.pipeline)))
             shown = ghosts.run(race, parts[0].runs[0].experiment, call.pipeline)
     except KeyboardInterrupt:
         with suppress(KoopError):  # such as a full disk: it stays an interrupt
@@ -147,7 +147,11 @@ def _refuse(call: Invocation, chosen: Sequence[Method]) -> None:
             if name in method.fixed:
                 raise UsageError(f"reproduce sweeps {name}: choose what it sweeps with --set '{method.fixed[name]}'")
         section, _, key = name.partition(".")
-        if len({one.name for one in chosen} - {"beyond"}) > 1 and section in ("sample", "test") and "." not in key:
+        if (
+            len({method.name for method in chosen} - {"beyond"}) > 1
+            and section in ("sample", "test")
+            and "." not in key
+        ):
             kinds = "grid.{0} or sample.ellipsoid.{0}" if section == "sample" else "box.{0} or test.ball.{0}"
             raise UsageError(f"--set {name}: say which, {section}.{kinds.format(key)}")
 
@@ -171,9 +175,9 @@ def _plans(call: Invocation, base: str, chosen: Sequence[Method]) -> dict[str, l
             if why is None:
                 used[name] = value
                 useless.pop(name, None)
-        said = [f"{name}={str(value).lower() if isinstance(value, bool) else value}" for name, value in used.items()]
-        sweep = tuple(change for change in said if change.startswith("reproduce."))
-        changes = tuple(change for change in said if not change.startswith("reproduce."))
+        sets = [f"{name}={str(value).lower() if isinstance(value, bool) else value}" for name, value in used.items()]
+        sweep = tuple(change for change in sets if change.startswith("reproduce."))
+        changes = tuple(change for change in sets if not change.startswith("reproduce."))
         here = planned(method, Run("here", plain, (), base, sweep))
         plans[method.name] = [here]
         if here.tasks != changed.tasks:
@@ -213,19 +217,19 @@ def _finish(
             show_table(table.header, table.rows, title=table.title, left=left, lines=True, file=sys.stderr)
         for note in part.method.notes(part.runs):
             call.console.note(note)
-        for one in part.illustrations:
-            if one.drawing is None:
-                call.console.warn(f"the figure '{one.figure}' is not drawn: {one.reason}")
+        for picture in part.illustrations:
+            if picture.drawing is None:
+                call.console.warn(f"the figure '{picture.figure}' is not drawn: {picture.reason}")
     label = f"reproduce-{name}-{_identity(parts)}"
     made = [scored.record for part in parts for run in part.runs for scored in run.scored]
-    made += [one.record for part in parts for one in part.illustrations if one.record is not None]
+    made += [picture.record for part in parts for picture in part.illustrations if picture.record is not None]
     made += [] if isinstance(shown, str) else [call.pipeline.make(task).record for task in racing]
     pin(call.pipeline.store, label, call.pipeline.with_inputs(made))
     call.console.note(f"pinned as {label}")
     path = _write_report(call, name, parts, shown)
     if as_json:
         runs = [_run_json(part.method, run) for part in parts for run in part.runs]
-        figures = [_figure_json(part.method, one) for part in parts for one in part.illustrations]
+        figures = [_figure_json(part.method, picture) for part in parts for picture in part.illustrations]
         print_json({"name": path.parent.name, "path": str(path), "runs": runs, "figures": figures})
     else:
         print(path)
@@ -234,7 +238,7 @@ def _finish(
 def _identity(parts: Sequence[Part]) -> str:
     """What tells a report from others: the artefacts it shows."""
     names = [scored.record.name for part in parts for run in part.runs for scored in run.scored]
-    names += [one.record.name for part in parts for one in part.illustrations if one.record is not None]
+    names += [picture.record.name for part in parts for picture in part.illustrations if picture.record is not None]
     return hashlib.sha256("\n".join(names).encode()).hexdigest()[:12]
 
 
@@ -255,7 +259,7 @@ def _write_report(
             f"{part.method.title[0].upper()}{part.method.title[1:]}",
             part.method.tables(part.runs) if part.whole else [],
             part.method.notes(part.runs) if part.whole else [],
-            [one for one in part.illustrations if part.planned is None or one.drawing is not None],
+            [picture for picture in part.illustrations if part.planned is None or picture.drawing is not None],
             full_table(part.method, part.runs),
         )
         for part in parts
@@ -283,10 +287,10 @@ def _run_json(method: Method, run: Run) -> dict[str, Any]:
     return {"method": method.name, "run": run.label, "evaluations": cells}
 
 
-def _figure_json(method: Method, one: Illustration) -> dict[str, Any]:
-    name = None if one.record is None else one.record.name
-    about = {"figure": one.figure, "name": name, "caption": one.caption, "command": one.command}
-    return {"method": method.name, "run": one.run, **about}
+def _figure_json(method: Method, picture: Illustration) -> dict[str, Any]:
+    name = None if picture.record is None else picture.record.name
+    about = {"figure": picture.figure, "name": name, "caption": picture.caption, "command": picture.command}
+    return {"method": method.name, "run": picture.run, **about}
 
 
 def register(app: typer.Typer) -> None:

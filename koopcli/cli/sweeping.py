@@ -156,10 +156,10 @@ def _shard(text: str | None) -> tuple[int, int] | None:
     """Which part of how many."""
     if text is None:
         return None
-    found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text.strip())
-    if found is None or not 1 <= int(found[1]) <= int(found[2]):
+    match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text.strip())
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
         raise UsageError(f"--shard {text}: write I/N with I from 1 to N, such as --shard 3/8")
-    return int(found[1]), int(found[2])
+    return int(match[1]), int(match[2])
 
 
 def _say_left_out(call: Invocation, grid: Grid, every: Sequence[Cell]) -> None:
@@ -253,8 +253,8 @@ def _show_scores(table: Swept) -> None:
         row = [told.get(name, "–") for name in shown]
         row.append(f"{scores['functions'][0]:.0f}")
         if seeds:
-            known = scores["mean"][np.isfinite(scores["mean"])]
-            ends = [f(known) if len(known) else np.nan for f in (np.median, np.min, np.max)]
+            finite = scores["mean"][np.isfinite(scores["mean"])]
+            ends = [f(finite) if len(finite) else np.nan for f in (np.median, np.min, np.max)]
             row += [str(len(group)), *map(_percent, ends)]
         else:
             row += [_percent(scores[name][0]) for name in ("mean", "std", "median", "max")]
@@ -278,11 +278,11 @@ def _drawn(call: Invocation, artefact: Artefact, image: ImageFormat) -> bytes:
 
     try:
         task = figure_tasks.figure("sweep", [call.pipeline.named(artefact.record.name)], image, call.experiment)
-        found: bytes = call.pipeline.make(task).content.image
+        drawing: bytes = call.pipeline.make(task).content.image
     except InvalidValueError as error:  # where all diverged
         call.console.warn(f"the figure is not drawn: {error}")
         return b""
-    return found
+    return drawing
 
 
 def register(app: typer.Typer) -> None:

@@ -41,15 +41,15 @@ def ls(as_json: JsonOption = False) -> None:
     from koopcli.simulation.portrait import plants_of
     from koopcli.vehicles.parameters import read_vehicle_file
 
-    found = {path.stem: read_vehicle_file(path) for path in _shipped()}
+    files = {path.stem: read_vehicle_file(path) for path in _shipped()}
     if as_json:
-        print_json({name: {"title": one.title, "plants": plants_of(one.parameters)} for name, one in found.items()})
+        print_json({name: {"title": file.title, "plants": plants_of(file.parameters)} for name, file in files.items()})
         return
     rows = []
-    for name, one in found.items():
-        p = one.parameters
+    for name, file in files.items():
+        p = file.parameters
         grip = "–" if p.lateral is None else f"{p.mu_scale * p.lateral.mu:.3g}"
-        rows.append([name, one.title, " ".join(plants_of(p)), f"{p.m:g} kg", f"{p.l_f + p.l_r:.3f} m", grip])
+        rows.append([name, file.title, " ".join(plants_of(p)), f"{p.m:g} kg", f"{p.l_f + p.l_r:.3f} m", grip])
     show_table(["vehicle", "title", "plants", "mass", "wheelbase", "lateral grip"], rows, left=3)
 
 
@@ -75,36 +75,36 @@ def check(file: NameArgument, dt: DtOption = Simulate.dt, as_json: JsonOption = 
     from koopcli.simulation.portrait import plants_of, remarks
     from koopcli.vehicles.parameters import read_vehicle_file
 
-    found, console = read_vehicle_file(locate("vehicles", file, "vehicle")), Console()
-    said = list(remarks(found.parameters))
-    if not found.source:
-        said.append('no source: say where the numbers come from with source = "…"')
-    _print(found, dt, said, as_json=as_json)
-    for remark in said:
+    vehicle, console = read_vehicle_file(locate("vehicles", file, "vehicle")), Console()
+    texts = list(remarks(vehicle.parameters))
+    if not vehicle.source:
+        texts.append('no source: say where the numbers come from with source = "…"')
+    _print(vehicle, dt, texts, as_json=as_json)
+    for remark in texts:
         console.warn(remark)
-    plants = ", ".join(plants_of(found.parameters))
-    console.note(f"{file} can be used with the plants {plants}" + ("" if said else "; nothing about it is unusual"))
+    plants = ", ".join(plants_of(vehicle.parameters))
+    console.note(f"{file} can be used with the plants {plants}" + ("" if texts else "; nothing about it is unusual"))
 
 
-def _print(found: VehicleFile, dt: float, said: list[str], *, as_json: bool) -> None:
+def _print(vehicle: VehicleFile, dt: float, texts: list[str], *, as_json: bool) -> None:
     """The vehicle as tables or as JSON."""
     from koopcli.simulation.portrait import derived, plants_of
 
     if not (math.isfinite(dt) and 0 < dt <= 10):
         raise InvalidValueError(f"--dt must be above 0 and at most 10 s, got {dt:g}")
-    p = found.parameters
+    p = vehicle.parameters
     numbers = derived(p, dt)
     if as_json:
-        following = {one.name: {"value": one.value, "unit": one.unit} for one in numbers}
-        about = {"title": found.title, "source": found.source, "plants": plants_of(p), "remarks": said}
+        following = {number.name: {"value": number.value, "unit": number.unit} for number in numbers}
+        about = {"title": vehicle.title, "source": vehicle.source, "plants": plants_of(p), "remarks": texts}
         print_json({**about, "parameters": asdict(p), "derived": following})
         return
-    show_line(found.title or "a vehicle without a title")
+    show_line(vehicle.title or "a vehicle without a title")
     show_table(["parameter", "meaning", "value", "unit"], list(_parameters(p)), left=2)
-    rows = [[one.name, _shown(one.name, one.value), one.unit] for one in numbers]
+    rows = [[number.name, _shown(number.name, number.value), number.unit] for number in numbers]
     show_table(["what follows", "value", "unit"], rows, left=1)
-    if found.source:
-        show_line(f"source: {found.source}")
+    if vehicle.source:
+        show_line(f"source: {vehicle.source}")
 
 
 def _shown(name: str, value: float) -> str:

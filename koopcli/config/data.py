@@ -25,10 +25,10 @@ def locate(folder: str, name: str, what: str, relative_to: Path = Path()) -> Pat
     if name.endswith(".toml") or "/" in name:
         try:
             path = relative_to / Path(name).expanduser()
-            found = is_file(path)
+            exists = is_file(path)
         except (OSError, RuntimeError, ValueError) as error:
             raise InvalidValueError(f"{name}: cannot read the {what} file: {error}") from error
-        if not found:
+        if not exists:
             raise InvalidValueError(f"{name}: there is no such {what} file")
         return path
     shipped = {path.stem: path for path in sorted((data_folder() / folder).glob("*.toml"))}

@@ -41,7 +41,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Source:
+class Sections:
     """Raw values by section, where they came from, and the folder of relative paths in them."""
 
     values: Mapping[str, Mapping[str, Any]]
@@ -57,7 +57,7 @@ class Source:
 class Experiment:
     """Settings of every stage; :meth:`sample` and :meth:`test` give those that depend on a kind and on the vehicle."""
 
-    sources: tuple[Source, ...]
+    sources: tuple[Sections, ...]
     about: About
     simulate: Simulate
     fit_edmd: FitEdmd
@@ -126,12 +126,12 @@ class Experiment:
     def _sampled(self, section: str, usual: str, vehicle: VehicleParameters, *, tables: bool = False) -> SampleChoice:
         layers = [source.section(section) for source in self.sources]
         if tables:
-            layers = [one.only(lambda key, value: isinstance(value, Mapping)) for one in layers]
+            layers = [layer.only(lambda key, value: isinstance(value, Mapping)) for layer in layers]
         kinds = KINDS[section]
         kind = kinds[chosen_kind(kinds, layers, usual)]
         plant = self.plant_for(kind.meant_for)
-        known = {**vars(vehicle), **written(plant), "vehicle": plant.used(vehicle), "dt": self.simulate.dt}
-        beside = {name: known[name] for name in taken(kind)}
+        values = {**vars(vehicle), **written(plant), "vehicle": plant.used(vehicle), "dt": self.simulate.dt}
+        beside = {name: values[name] for name in taken(kind)}
         sample: SampleChoice = choose(kinds, layers, usual, f"{section}.", section, beside)
         return sample
 
@@ -164,14 +164,14 @@ class Experiment:
         if section == "simulate" and self.simulate.plant is None and keys[-1] not in written(self.simulate):
             return [written(self.plant_for(kind)).get(keys[-1]) for kind in PlantChoice.kinds().values()]
         name = keys[-2] if keys[-1] == "kind" and len(keys) > 1 else keys[-1]
-        beside = {other: getattr(self, other) for other in taken(DECLARED[section])}
+        beside = {needed: getattr(self, needed) for needed in taken(DECLARED[section])}
         chosen = Layer(dict(zip(keys[:-1:2], keys[1:-1:2], strict=False)))
         layers = [*(source.section(section) for source in self.sources), chosen]
         return written(build_layers(DECLARED[section], layers, beside=beside)).get(name)
 
     def without(self, name: str) -> Experiment:
         """The experiment without a change of the command line."""
-        changes = nested((other, value) for other, value in flat(self.sources[-1].values) if other != name)
+        changes = nested((setting, value) for setting, value in flat(self.sources[-1].values) if setting != name)
         return _experiment((*self.sources[:-1], replace(self.sources[-1], values=changes)))
 
 
@@ -179,10 +179,10 @@ def load_experiment(name: str, changes: Changes) -> Experiment:
     """The experiment ``name`` (shipped, or a file by its path) with ``changes`` of the command line laid over it."""
     path = locate("experiments", name, "experiment")
     here = from_file(path)
-    return _experiment((Source(_read(path, here), here, path.parent), Source(changes, COMMAND_LINE, Path())))
+    return _experiment((Sections(_read(path, here), here, path.parent), Sections(changes, COMMAND_LINE, Path())))
 
 
-def _experiment(sources: tuple[Source, ...]) -> Experiment:
+def _experiment(sources: tuple[Sections, ...]) -> Experiment:
     """The experiment of ``sources``, of which later ones win."""
     for source in sources:
         for section in source.values:
@@ -225,7 +225,7 @@ def _read(path: Path, here: Origin) -> Changes:
     return content
 
 
-def _vehicle(layers: Sequence[Source]) -> VehicleParameters:
+def _vehicle(layers: Sequence[Sections]) -> VehicleParameters:
     """The vehicle named last, with the single parameters that its own or a later layer changes."""
     vehicle = vehicle_named(DEFAULT_VEHICLE)
     for layer in layers:

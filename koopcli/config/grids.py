@@ -55,19 +55,19 @@ def parse_grid(assignments: Sequence[str]) -> Grid:
     one that is given twice, ``InvalidValueError`` for a range without end and for more than ``MOST`` cells.
     """
     axes, fixed = [], []
-    known: set[str] = set()
+    names: set[str] = set()
     for text in assignments:
         parse_set([text])  # names and form are those of any command
         name, _, raw = (part.strip() for part in text.partition("="))
-        if name in known:
+        if name in names:
             raise UsageError(f"--set {name} is given twice: write all its values into one, such as {name}=1,2,5:8")
-        known.add(name)
+        names.add(name)
         values = [value for word in split(raw) for value in _values(name, word)]
-        there: set[str] = set()
+        texts: set[str] = set()
         for value in values:
-            if text_of(value) in there:
+            if text_of(value) in texts:
                 raise InvalidValueError(f"--set {text}: the value {text_of(value)} stands there twice")
-            there.add(text_of(value))
+            texts.add(text_of(value))
         if len(values) > 1:
             axes.append(GridAxis(name, tuple(values)))
         else:
@@ -110,12 +110,12 @@ def _values(name: str, word: str) -> list[Any]:
     """The values that one of the words between commas stands for."""
     if not word.strip():
         raise UsageError(f"--set {name}: there is a value missing; write such as {name}=1,2,5:8")
-    found = RANGE.fullmatch(word)
-    if found is None:
+    match = RANGE.fullmatch(word)
+    if match is None:
         return [toml_value(word)]
-    whole = all(part is None or re.fullmatch(r"[+-]?\d+", part) for part in found.groups())
+    whole = all(part is None or re.fullmatch(r"[+-]?\d+", part) for part in match.groups())
     number: Callable[[str], Any] = int if whole else float
-    start, stop, step = (number(part) if part else 1 for part in found.groups())
+    start, stop, step = (number(part) if part else 1 for part in match.groups())
     count = (stop - start) / step if step else math.inf
     if not 0 <= count < MOST:
         raise InvalidValueError(

@@ -28,8 +28,8 @@ def fingerprint(source: object, names: tuple[str, ...]) -> Fingerprint:
     return Fingerprint(names, hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest())
 
 
-def called(known: Fingerprint) -> str:
+def called(wanted: Fingerprint) -> str:
     """Every shipped vehicle that has these parameters, else "own vehicle" and the first digits of their digest."""
     shipped = {path.stem: read_vehicle(path) for path in sorted((data_folder() / "vehicles").glob("*.toml"))}
-    alike = [name for name, vehicle in shipped.items() if fingerprint(vehicle, known.names) == known]
-    return " or ".join(alike) or f"own vehicle {known.digest[:DIGITS]}"
+    alike = [name for name, vehicle in shipped.items() if fingerprint(vehicle, wanted.names) == wanted]
+    return " or ".join(alike) or f"own vehicle {wanted.digest[:DIGITS]}"

@@ -24,7 +24,7 @@ def vehicle_words(vehicle: VehicleParameters, plant: PlantChoice) -> Words | Non
     """
     shipped = {path.stem: read_vehicle(path) for path in (data_folder() / "vehicles").glob("*.toml")}
     mine = _flat(vehicle, plant)
-    changes = {name: _differing(mine, _flat(other, plant)) for name, other in shipped.items()}
+    changes = {name: _differing(mine, _flat(theirs, plant)) for name, theirs in shipped.items()}
     sayable = [name for name, changed in changes.items() if None not in changed.values()]
     if not sayable:
         return None
@@ -41,7 +41,7 @@ def plant_words(simulate: Simulate) -> Words:
 
 def sample_words(sample: SampleChoice, names: Sequence[str]) -> Words:
     """Those of the settings ``names`` of a sample that are not at their defaults."""
-    mine, usual = ({name: getattr(one, name) for name in names if hasattr(one, name)} for one in (sample, type(sample)))
+    mine, usual = ({name: getattr(of, name) for name in names if hasattr(of, name)} for of in (sample, type(sample)))
     return _words("sample", _differing(mine, usual))
 
 

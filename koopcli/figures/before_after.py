@@ -57,23 +57,23 @@ class Errors:
 
 def select(sources: Sequence[Source], settings: Plot) -> list[Errors]:
     """What the figure shows. Raises ``InvalidValueError`` where every prediction of all evaluations diverged."""
-    found = []
+    errors = []
     for source, shown in zip(sources, with_error(sources), strict=True):
         evaluation: Evaluation = source.records["evaluation"]
         order = np.argsort(evaluation.rmse[shown], kind="stable")
         label = source.label if shown.any() else source.label + LOST
         x0, rmse = evaluation.x0[shown][order], evaluation.rmse[shown][order]
-        found.append(Errors(label, x0, rmse, evaluation.state_channels))
-    return found
+        errors.append(Errors(label, x0, rmse, evaluation.state_channels))
+    return errors
 
 
 def numbers(shown: Sequence[Errors]) -> Mapping[str, Array]:
     """Every initial state with its error, of each predictor."""
-    found: dict[str, Array] = {}
-    for one in shown:
-        found |= state_columns(one.x0, one.channels, "trajectory", f"{one.label}/{{}}_0")
-        found[f"{one.label}/rmse"] = column(one.rmse, "trajectory", "%")
-    return found
+    columns: dict[str, Array] = {}
+    for scored in shown:
+        columns |= state_columns(scored.x0, scored.channels, "trajectory", f"{scored.label}/{{}}_0")
+        columns[f"{scored.label}/rmse"] = column(scored.rmse, "trajectory", "%")
+    return columns
 
 
 def draw(shown: Sequence[Errors]) -> Figure:
@@ -81,7 +81,7 @@ def draw(shown: Sequence[Errors]) -> Figure:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
 
-    errors = np.concatenate([one.rmse for one in shown])
+    errors = np.concatenate([scored.rmse for scored in shown])
     low = max(float(np.quantile(errors, LEAST)), FAINTEST)
     top = max(2 * low, float(np.quantile(errors, LARGEST_SHOWN)))
     shades = ScalarMappable(LogNorm(low, top), SHADES)
@@ -89,13 +89,13 @@ def draw(shown: Sequence[Errors]) -> Figure:
         figure = Figure(figsize=(COLUMN, 4.6), layout="constrained")
         panels = figure.subplots(len(VIEWS), len(shown), sharex="row", sharey="row", squeeze=False)
         names = [axis_label(n, u) for n, u in zip(shown[0].channels.names, shown[0].channels.units, strict=True)]
-        for one, column_ in zip(shown, panels.T, strict=True):
-            mean = f"\nmean {one.rmse.mean():.3g} %" if len(one.rmse) else ""
-            name = fill(plain(one.label), WIDE // len(shown))
+        for scored, column_ in zip(shown, panels.T, strict=True):
+            mean = f"\nmean {scored.rmse.mean():.3g} %" if len(scored.rmse) else ""
+            name = fill(plain(scored.label), WIDE // len(shown))
             column_[0].set_title(f"{name}{mean}", fontsize=8)
-            colours = shades.to_rgba(np.maximum(one.rmse, low))
+            colours = shades.to_rgba(np.maximum(scored.rmse, low))
             for axes, (across, up) in zip(column_, VIEWS, strict=True):
-                at = one.x0[:, across], one.x0[:, up]
+                at = scored.x0[:, across], scored.x0[:, up]
                 axes.scatter(*at, s=3, color=colours, linewidths=0, zorder=3, rasterized=True)
                 ticks(axes.xaxis, 4)
         for row, (across, up) in zip(panels, VIEWS, strict=True):

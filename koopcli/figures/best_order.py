@@ -72,8 +72,8 @@ def draw(shown: BestOrders) -> Figure:
         axes = figure.subplots()
         counts = [int((shown.best == order).sum()) for order in shown.orders]
         axes.bar(shown.orders, counts, color=COLOURS[0], width=0.7, label=f"best of {len(shown.best)} training draws")
-        there = [order for order in BEST_ORDERS if order in shown.orders]
-        axes.plot(there, [0.0] * len(there), "^", color=PAPER, clip_on=False, zorder=5, label="the paper's best orders")
+        best = [order for order in BEST_ORDERS if order in shown.orders]
+        axes.plot(best, [0.0] * len(best), "^", color=PAPER, clip_on=False, zorder=5, label="the paper's best orders")
         axes.set_xticks(shown.orders)
         ticks(axes.yaxis, integer=True)
         axes.set_xlabel("order of the polynomial basis")

@@ -53,12 +53,12 @@ def _spread(source: Source, shown: BoolArray) -> Spread:
 
 def numbers(shown: Sequence[Spread]) -> Mapping[str, Array]:
     """For each predictor its quantiles, its mean and how many diverged."""
-    found = {"quantile": column(np.array(QUANTILES), "quantile", "1")}
-    for one in shown:
-        found[f"{one.label}/rmse"] = column(one.quantiles, "quantile", "%")
-        found[f"{one.label}/mean"] = column(np.array([one.mean]), "predictor", "%")
-        found[f"{one.label}/diverged"] = column(np.array([float(one.diverged)]), "predictor", "1")
-    return found
+    columns = {"quantile": column(np.array(QUANTILES), "quantile", "1")}
+    for spread in shown:
+        columns[f"{spread.label}/rmse"] = column(spread.quantiles, "quantile", "%")
+        columns[f"{spread.label}/mean"] = column(np.array([spread.mean]), "predictor", "%")
+        columns[f"{spread.label}/diverged"] = column(np.array([float(spread.diverged)]), "predictor", "1")
+    return columns
 
 
 def draw(shown: Sequence[Spread]) -> Figure:
@@ -66,12 +66,12 @@ def draw(shown: Sequence[Spread]) -> Figure:
     with style():
         figure = Figure(figsize=(COLUMN, 1.0 + 0.3 * len(shown) + LINE * _wrapped(shown)), layout="constrained")
         axes = figure.subplots()
-        first_drawn = next(row for row, one in enumerate(shown) if np.isfinite(one.mean))
-        for row, one in enumerate(shown):
-            if not np.isfinite(one.mean):
+        first_drawn = next(row for row, spread in enumerate(shown) if np.isfinite(spread.mean))
+        for row, spread in enumerate(shown):
+            if not np.isfinite(spread.mean):
                 continue
             named = str if row == first_drawn else _nameless
-            low, first, median, third, high = one.quantiles
+            low, first, median, third, high = spread.quantiles
             axes.plot([low, high], [row, row], "-", color=COLOURS[0], linewidth=0.8, zorder=2, label=named("5 to 95 %"))
             axes.barh(row, third - first, left=first, height=0.5, color=COLOURS[5], zorder=3, label=named("quartiles"))
             axes.plot(
@@ -83,13 +83,13 @@ def draw(shown: Sequence[Spread]) -> Figure:
                 zorder=4,
                 label=named("median"),
             )
-            axes.plot(one.mean, row, "D", color=COLOURS[1], markersize=4, zorder=5, label=named("mean"))
+            axes.plot(spread.mean, row, "D", color=COLOURS[1], markersize=4, zorder=5, label=named("mean"))
         axes.use_sticky_edges = False
         axes.set_xscale("log")
         axes.margins(x=0.06)
         plain_numbers(axes.xaxis)
         axes.set_ylim(len(shown) - 0.5, -0.5)
-        axes.set_yticks(range(len(shown)), [_row(one) for one in shown])
+        axes.set_yticks(range(len(shown)), [_row(spread) for spread in shown])
         axes.grid(visible=False, axis="y")
         axes.set_xlabel("RMSE (%)")
         figure.legend(loc="outside lower center", ncols=4, columnspacing=1.0, handletextpad=0.5)
@@ -102,12 +102,12 @@ def _nameless(label: str) -> None:
 
 def _wrapped(shown: Sequence[Spread]) -> int:
     """Lines of names beyond one each."""
-    return sum(_row(one).count("\n") - 1 for one in shown)
+    return sum(_row(spread).count("\n") - 1 for spread in shown)
 
 
-def _row(one: Spread) -> str:
-    name = fill(plain(one.label), WIDEST)
-    if not np.isfinite(one.mean):
+def _row(spread: Spread) -> str:
+    name = fill(plain(spread.label), WIDEST)
+    if not np.isfinite(spread.mean):
         return f"{name}\nall diverged"
-    lost = f", {one.diverged} diverged" if one.diverged else ""
-    return f"{name}\nmean {one.mean:.3g} %{lost}"
+    lost = f", {spread.diverged} diverged" if spread.diverged else ""
+    return f"{name}\nmean {spread.mean:.3g} %{lost}"

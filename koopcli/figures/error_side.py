@@ -65,8 +65,8 @@ def draw(shown: ErrorSide) -> Figure:
             name = "training trajectories"
             axes.add_collection(LineCollection(lines, colors=TRAINING, linewidths=0.3, rasterized=True, label=name))
         else:
-            there = np.unique(shown.paths[:, 0, SIDE], axis=0)
-            axes.plot(*there.T, "s", color=TRAINING, markersize=4, zorder=1, label="training states")
+            starts = np.unique(shown.paths[:, 0, SIDE], axis=0)
+            axes.plot(*starts.T, "s", color=TRAINING, markersize=4, zorder=1, label="training states")
         balls = axes.scatter(
             seen.x0[:, i],
             seen.x0[:, j],

@@ -66,29 +66,29 @@ def select(sources: Sequence[Source], settings: Plot) -> list[Frontier]:
     for source in sources:
         mean = source.records["evaluation"].figures()["rmse"]["mean"]
         groups.setdefault(source.label, []).append((source.at or 0.0, mean))
-    found = []
+    frontiers = []
     for label, members in groups.items():
         vehicle, colon, method = label.partition(": ")
         seconds, mean = np.array(sorted(members)).T
-        found.append(Frontier(vehicle if colon else "", method if colon else vehicle, seconds, mean))
-    if not any(np.isfinite(one.mean).any() for one in found):
+        frontiers.append(Frontier(vehicle if colon else "", method if colon else vehicle, seconds, mean))
+    if not any(np.isfinite(curve.mean).any() for curve in frontiers):
         raise InvalidValueError("every prediction of these evaluations diverged: there is no error to draw")
-    return found
+    return frontiers
 
 
 def numbers(shown: Sequence[Frontier]) -> Mapping[str, Array]:
     """Seconds and mean error of each line."""
-    found: dict[str, Array] = {}
-    for one in shown:
-        name = f"{one.vehicle}: {one.method}" if one.vehicle else one.method
-        found[f"{name}/simulated"] = column(one.seconds, "budget", "s")
-        found[f"{name}/mean"] = column(one.mean, "budget", "%")
-    return found
+    columns: dict[str, Array] = {}
+    for curve in shown:
+        name = f"{curve.vehicle}: {curve.method}" if curve.vehicle else curve.method
+        columns[f"{name}/simulated"] = column(curve.seconds, "budget", "s")
+        columns[f"{name}/mean"] = column(curve.mean, "budget", "%")
+    return columns
 
 
 def draw(shown: Sequence[Frontier]) -> Figure:
     """Panels below one another, which share their axes; a method has one colour and mark in all of them."""
-    vehicles, methods = (list(dict.fromkeys(getattr(one, name) for one in shown)) for name in ("vehicle", "method"))
+    vehicles, methods = (list(dict.fromkeys(getattr(curve, name) for curve in shown)) for name in ("vehicle", "method"))
     look = dict(zip(methods, looks(len(methods)), strict=True))
     mark = {method: MARKERS[i % len(MARKERS)] for i, method in enumerate(methods)}
     with style():
@@ -96,10 +96,10 @@ def draw(shown: Sequence[Frontier]) -> Figure:
         panels = figure.subplots(len(vehicles), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
         named: set[str] = set()
         for axes, vehicle in zip(panels, vehicles, strict=True):
-            for one in (one for one in shown if one.vehicle == vehicle):
-                label = None if one.method in named else plain(one.method)
-                named.add(one.method)
-                axes.plot(one.seconds, one.mean, marker=mark[one.method], label=label, **look[one.method])
+            for curve in (curve for curve in shown if curve.vehicle == vehicle):
+                label = None if curve.method in named else plain(curve.method)
+                named.add(curve.method)
+                axes.plot(curve.seconds, curve.mean, marker=mark[curve.method], label=label, **look[curve.method])
             axes.set_xscale("log")
             axes.set_yscale("log")
             axes.set_ylabel("mean RMSE (%)")

@@ -72,11 +72,11 @@ def _over_time(source: Source, shown: BoolArray) -> ErrorOverTime:
 
 def numbers(shown: Sequence[ErrorOverTime]) -> Mapping[str, Array]:
     """Time, and the quantiles of each evaluation."""
-    found = {"time": column(shown[0].time, "sample", "s")}
-    for one in shown:
+    columns = {"time": column(shown[0].time, "sample", "s")}
+    for curve in shown:
         for name in QUANTILES:
-            found[f"{one.label}/{name}".removeprefix("/")] = column(getattr(one, name), "sample", "%")
-    return found
+            columns[f"{curve.label}/{name}".removeprefix("/")] = column(getattr(curve, name), "sample", "%")
+    return columns
 
 
 def draw(shown: Sequence[ErrorOverTime]) -> Figure:
@@ -84,7 +84,7 @@ def draw(shown: Sequence[ErrorOverTime]) -> Figure:
     thick and the others grey. Each line is named at its end.
     """
     alone = len(shown) == 1
-    lines = _band(shown[0]) if alone else [_median(one, i) for i, one in enumerate(shown)]
+    lines = _band(shown[0]) if alone else [_median(curve, i) for i, curve in enumerate(shown)]
     height = max(LOWEST, room_for([line.end.name for line in lines]))
     with style():
         figure = Figure(figsize=(COLUMN, height + BELOW), layout="constrained")
@@ -114,27 +114,27 @@ class _Line:
     end: End
 
 
-def _median(one: ErrorOverTime, place: int) -> _Line:
+def _median(curve: ErrorOverTime, place: int) -> _Line:
     """The median of one among several: the first is what the others are set beside."""
-    values = _seen(one.median)
+    values = _seen(curve.median)
     if place == 0:
         look, colour, weight = {"color": COLOURS[0], "linewidth": THICK, "zorder": 3}, COLOURS[0], "bold"
     else:
         colour, weight = OTHERS[0], "normal"
         look = {"color": OTHERS[place % len(OTHERS)], "linewidth": 1.0, "linestyle": DASHES[place % len(DASHES)]}
-    return _Line(values, look, End(_last(values), plain(one.label), colour, _leading(look), weight))
+    return _Line(values, look, End(_last(values), plain(curve.label), colour, _leading(look), weight))
 
 
-def _band(one: ErrorOverTime) -> list[_Line]:
+def _band(curve: ErrorOverTime) -> list[_Line]:
     """The median of the only evaluation, and the ends of its band."""
     ends = [("upper", "90 % are below", 0.6, OTHERS[0]), ("median", "median", THICK, COLOURS[0])]
     ends.append(("lower", "10 % are below", 0.6, OTHERS[0]))
-    found = []
+    lines = []
     for name, text, width, colour in ends:
-        values = _seen(getattr(one, name))
+        values = _seen(getattr(curve, name))
         look = {"color": colour, "linewidth": width}
-        found.append(_Line(values, look, End(_last(values), text, colour, _leading(look))))
-    return found
+        lines.append(_Line(values, look, End(_last(values), text, colour, _leading(look))))
+    return lines
 
 
 def _leading(look: Mapping[str, Any]) -> dict[str, Any]:

@@ -56,20 +56,20 @@ def select(sources: Sequence[Source], settings: Plot) -> list[ModeErrors]:
         mean = source.records["evaluation"].figures()["rmse"]["mean"]
         missed = np.nan if predictor.regression.missed is None else predictor.regression.missed
         groups.setdefault(source.label, []).append((source.at or 0.0, missed, mean))
-    found = [ModeErrors(label, *np.array(sorted(members)).T) for label, members in groups.items()]
-    if not any(np.isfinite(one.mean).any() for one in found):
+    curves = [ModeErrors(label, *np.array(sorted(members)).T) for label, members in groups.items()]
+    if not any(np.isfinite(curve.mean).any() for curve in curves):
         raise InvalidValueError("every prediction of these evaluations diverged: there is no error to draw")
-    return found
+    return curves
 
 
 def numbers(shown: Sequence[ModeErrors]) -> Mapping[str, Array]:
     """Modes, what is missed and the mean error of each kind."""
-    found: dict[str, Array] = {}
-    for one in shown:
-        found[f"{one.label}/modes"] = column(one.modes, "fit", "1")
-        found[f"{one.label}/missed"] = column(one.missed, "fit", "%")
-        found[f"{one.label}/mean"] = column(one.mean, "fit", "%")
-    return found
+    columns: dict[str, Array] = {}
+    for curve in shown:
+        columns[f"{curve.label}/modes"] = column(curve.modes, "fit", "1")
+        columns[f"{curve.label}/missed"] = column(curve.missed, "fit", "%")
+        columns[f"{curve.label}/mean"] = column(curve.mean, "fit", "%")
+    return columns
 
 
 def draw(shown: Sequence[ModeErrors]) -> Figure:
@@ -77,10 +77,10 @@ def draw(shown: Sequence[ModeErrors]) -> Figure:
     with style():
         figure = Figure(figsize=(COLUMN, 4.2), layout="constrained")
         fit, prediction = figure.subplots(2, 1, sharex=True)
-        for i, (one, look) in enumerate(zip(shown, looks(len(shown)), strict=True)):
+        for i, (curve, look) in enumerate(zip(shown, looks(len(shown)), strict=True)):
             marker = MARKERS[i % len(MARKERS)]
-            fit.plot(one.modes, one.missed, marker=marker, label=plain(one.label), **look)
-            prediction.plot(one.modes, one.mean, marker=marker, **look)
+            fit.plot(curve.modes, curve.missed, marker=marker, label=plain(curve.label), **look)
+            prediction.plot(curve.modes, curve.mean, marker=marker, **look)
         for axes, name in ((fit, "missed by the fit (%)"), (prediction, "mean RMSE (%)")):
             axes.set_yscale("log")
             plain_numbers(axes.yaxis)

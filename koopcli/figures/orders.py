@@ -57,25 +57,25 @@ def select(sources: Sequence[Source], settings: Plot) -> list[OrderErrors]:
     for source in sources:
         score = source.records["evaluation"].figures()["rmse"]
         groups.setdefault(source.label, []).append((round(source.at or 0), score))
-    found = []
+    curves = []
     for label, members in groups.items():
         ordered = sorted(members, key=lambda member: member[0])
         order = np.array([order for order, _ in ordered])
         statistics = (np.array([score[name] for _, score in ordered]) for name in ("mean", "median", "max"))
-        found.append(OrderErrors(label, order, *statistics))
-    if not any(np.isfinite(curve.mean).any() for curve in found):
+        curves.append(OrderErrors(label, order, *statistics))
+    if not any(np.isfinite(curve.mean).any() for curve in curves):
         raise InvalidValueError("every prediction of these evaluations diverged: there is no error to draw")
-    return found
+    return curves
 
 
 def numbers(curves: Sequence[OrderErrors]) -> Mapping[str, Array]:
     """Order, mean, median and maximum of each curve."""
-    found: dict[str, Array] = {}
+    columns: dict[str, Array] = {}
     for curve in curves:
-        found[f"{curve.label}/order"] = column(curve.order, "order", "1")
+        columns[f"{curve.label}/order"] = column(curve.order, "order", "1")
         for statistic in ("mean", "median", "maximum"):
-            found[f"{curve.label}/{statistic}"] = column(getattr(curve, statistic), "order", "%")
-    return found
+            columns[f"{curve.label}/{statistic}"] = column(getattr(curve, statistic), "order", "%")
+    return columns
 
 
 def draw(curves: Sequence[OrderErrors]) -> Figure:

@@ -45,24 +45,24 @@ def select(sources: Sequence[Source], settings: Plot) -> list[Histogram]:
     some = every[every > 0] if (every > 0).any() else np.ones(1)
     low, high = some.min(), max(some.max(), some.min() * NARROWEST)
     edges = np.geomspace(low * (1 - 1e-9), high * (1 + 1e-9), BINS + 1)
-    found = []
+    histograms = []
     for source, rmse in zip(sources, errors, strict=True):
         if not len(rmse):
-            found.append(Histogram(source.label + LOST, edges, np.zeros(BINS), np.nan, np.nan))
+            histograms.append(Histogram(source.label + LOST, edges, np.zeros(BINS), np.nan, np.nan))
             continue
         counts = np.histogram(np.clip(rmse, edges[0], edges[-1]), edges)[0]
         share = 100 * counts / len(rmse)
-        found.append(Histogram(source.label, edges, share, float(rmse.mean()), float(np.median(rmse))))
-    return found
+        histograms.append(Histogram(source.label, edges, share, float(rmse.mean()), float(np.median(rmse))))
+    return histograms
 
 
 def numbers(shown: Sequence[Histogram]) -> Mapping[str, Array]:
     """The bins, and the share of each evaluation in them."""
     edges = shown[0].edges
-    found = {"rmse from": column(edges[:-1], "bin", "%"), "rmse to": column(edges[1:], "bin", "%")}
-    for one in shown:
-        found[f"{one.label}/share".removeprefix("/")] = column(one.share, "bin", "%")
-    return found
+    columns = {"rmse from": column(edges[:-1], "bin", "%"), "rmse to": column(edges[1:], "bin", "%")}
+    for bars in shown:
+        columns[f"{bars.label}/share".removeprefix("/")] = column(bars.share, "bin", "%")
+    return columns
 
 
 def draw(shown: Sequence[Histogram]) -> Figure:
@@ -70,14 +70,14 @@ def draw(shown: Sequence[Histogram]) -> Figure:
     with style():
         figure = Figure(figsize=(COLUMN, 2.5), layout="constrained")
         axes = figure.subplots()
-        for one, look in zip(shown, looks(len(shown)), strict=True):
+        for bars, look in zip(shown, looks(len(shown)), strict=True):
             if len(shown) == 1:
-                axes.stairs(one.share, one.edges, fill=True, color=COLOURS[5])
-                axes.axvline(one.mean, color=COLOURS[0], label=f"mean {one.mean:.4g} %")
-                axes.axvline(one.median, color=COLOURS[1], linestyle="--", label=f"median {one.median:.4g} %")
+                axes.stairs(bars.share, bars.edges, fill=True, color=COLOURS[5])
+                axes.axvline(bars.mean, color=COLOURS[0], label=f"mean {bars.mean:.4g} %")
+                axes.axvline(bars.median, color=COLOURS[1], linestyle="--", label=f"median {bars.median:.4g} %")
             else:
-                median = f" (median {one.median:.3g} %)" if np.isfinite(one.median) else ""
-                axes.stairs(one.share, one.edges, label=plain(one.label) + median, linewidth=1.2, **look)
+                median = f" (median {bars.median:.3g} %)" if np.isfinite(bars.median) else ""
+                axes.stairs(bars.share, bars.edges, label=plain(bars.label) + median, linewidth=1.2, **look)
         axes.set_xscale("log")
         plain_numbers(axes.xaxis)
         axes.set_xlabel("RMSE (%)")

@@ -38,7 +38,7 @@ class Arrow:
 def select(sources: Sequence[Source], settings: Plot) -> list[Arrow]:
     """Velocities and forces of the sketch; a wheel's lateral force points against its sideways velocity."""
     across = np.array([0.0, 1.0])
-    found = [
+    arrows = [
         Arrow("$v_x$", np.zeros(2), V * [1, 0], V * [1, 0] + [-0.05, -0.17], MOTION),
         Arrow("$v_y$", np.zeros(2), V * [0, 1], V * [0, 1] + [0.02, 0.14], MOTION),
         Arrow("$v$", np.zeros(2), V, V + np.array([0.1, 0.08]), MOTION),
@@ -50,23 +50,23 @@ def select(sources: Sequence[Source], settings: Plot) -> list[Arrow]:
         pull = -1 if velocity @ left > 0 else 1
         push = at + 0.56 * along
         side = at + 0.7 * pull * left
-        found += [
+        arrows += [
             Arrow(f"$F_{{{axle},x}}$", at, push, push + 0.13 * along - 0.1 * left, FORCE),
             Arrow(f"$F_{{{axle},y}}$", at, side, side + 0.15 * pull * left, FORCE),
             Arrow(f"$v_{axle}$", at, at + velocity, at + velocity + [0.12, 0.05], MOTION),
         ]
-    return found
+    return arrows
 
 
 def numbers(shown: Sequence[Arrow]) -> Mapping[str, Array]:
     """Tail and head of every arrow."""
-    found: dict[str, Array] = {}
+    columns: dict[str, Array] = {}
     for arrow in shown:
         ends = np.array([arrow.tail, arrow.head])
         name = arrow.name.translate({ord(sign): None for sign in "${},"})
-        found[f"{name}/x"] = column(ends[:, 0], "tail and head", "m")
-        found[f"{name}/y"] = column(ends[:, 1], "tail and head", "m")
-    return found
+        columns[f"{name}/x"] = column(ends[:, 0], "tail and head", "m")
+        columns[f"{name}/y"] = column(ends[:, 1], "tail and head", "m")
+    return columns
 
 
 def draw(shown: Sequence[Arrow]) -> Figure:

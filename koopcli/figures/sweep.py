@@ -62,25 +62,25 @@ def select(sources: Sequence[Source], settings: Plot) -> SweptErrors:
     kept = [i for i, name in enumerate(table.names) if i != axis and name.rpartition(".")[2] != REPEATS]
     groups: dict[tuple[int, ...], dict[float, list[float]]] = {}
     for place, error in zip(table.places.tolist(), mean.tolist(), strict=True):
-        there = groups.setdefault(tuple(place[i] for i in kept), {})
+        points = groups.setdefault(tuple(place[i] for i in kept), {})
         for spot in at if place[axis] < 0 else at[[place[axis]]]:  # where it has no effect a curve is flat
-            there.setdefault(float(spot), []).append(error)
-    curves = [_curve(_label(table, kept, place), there) for place, there in groups.items()]
+            points.setdefault(float(spot), []).append(error)
+    curves = [_curve(_label(table, kept, place), points) for place, points in groups.items()]
     worth = {i: float(np.nanmin(c.middle)) for i, c in enumerate(curves) if np.isfinite(c.middle).any()}
     best = sorted(sorted(worth, key=worth.__getitem__)[:MOST])
-    seeds = max(len(errors) for there in groups.values() for errors in there.values())
+    seeds = max(len(errors) for points in groups.values() for errors in points.values())
     return SweptErrors(table.names[axis], words, tuple(curves[i] for i in best), len(curves) - len(best), seeds)
 
 
 def numbers(shown: SweptErrors) -> Mapping[str, Array]:
     """Where each curve has points, the median over seeds, the least and the largest."""
-    found: dict[str, Array] = {}
+    columns: dict[str, Array] = {}
     for curve in shown.curves:
         front = f"{curve.label}/" if curve.label else ""
-        found[f"{front}{shown.name}"] = column(curve.at, "point", "place" if shown.words else "as set")
+        columns[f"{front}{shown.name}"] = column(curve.at, "point", "place" if shown.words else "as set")
         for name in ("middle", "low", "high"):
-            found[f"{front}{name}"] = column(getattr(curve, name), "point", "%")
-    return found
+            columns[f"{front}{name}"] = column(getattr(curve, name), "point", "%")
+    return columns
 
 
 def draw(shown: SweptErrors) -> Figure:
@@ -141,10 +141,10 @@ def _numeric(values: Sequence[str]) -> bool:
         return False
 
 
-def _curve(label: str, there: Mapping[float, Sequence[float]]) -> Curve:
-    at = np.array(sorted(there))
-    known = [[error for error in there[spot] if np.isfinite(error)] or [np.nan] for spot in at]
-    return Curve(label, at, *(np.array([f(errors) for errors in known]) for f in (np.median, min, max)))
+def _curve(label: str, points: Mapping[float, Sequence[float]]) -> Curve:
+    at = np.array(sorted(points))
+    groups = [[error for error in points[spot] if np.isfinite(error)] or [np.nan] for spot in at]
+    return Curve(label, at, *(np.array([f(errors) for errors in groups]) for f in (np.median, min, max)))
 
 
 def _label(table: Swept, kept: Sequence[int], place: Sequence[int]) -> str:

@@ -166,27 +166,27 @@ def _panels(shown: Path) -> list[_Panel]:
     names, units = shown.state_channels.names, shown.state_channels.units
     body = [{"car": shown.x[:, 0], **{f"{label} rim": v for label, v in shown.rim.items()}}]
     body += [{names[i]: shown.x[:, i]} for i in (1, 2)]
-    found = [_Panel(names[i], units[i], lines) for i, lines in enumerate(body)]
-    found.append(_Panel("a_y", "m/s²", {"a_y": shown.lateral}))
+    panels = [_Panel(names[i], units[i], lines) for i, lines in enumerate(body)]
+    panels.append(_Panel("a_y", "m/s²", {"a_y": shown.lateral}))
     inputs = list(zip(shown.input_channels.names, shown.input_channels.units, shown.u.T, strict=True))
     for unit in dict.fromkeys(shown.input_channels.units):
-        lines = {name: np.append(u, u[-1]) for name, one, u in inputs if one == unit}
+        lines = {name: np.append(u, u[-1]) for name, measure, u in inputs if measure == unit}
         panel = _Panel("input", unit, lines, held=True)
         moving = list(panel.moving)
-        found.append(_Panel(moving[0], unit, lines, held=True) if len(moving) == 1 else panel)
-    return found
+        panels.append(_Panel(moving[0], unit, lines, held=True) if len(moving) == 1 else panel)
+    return panels
 
 
 def _notes(shown: Path, panels: Sequence[_Panel]) -> list[str]:
     """What is said above the course: why it ends, and what is held constant other than at zero."""
-    found = [f"ends at {shown.time[-1]:.2f} s: it {shown.end}"] if shown.end else []
+    notes = [f"ends at {shown.time[-1]:.2f} s: it {shown.end}"] if shown.end else []
     held: dict[str, list[str]] = {}
     for panel in panels:
         for name in (name for name in panel.lines if name not in panel.moving):
             if value := panel.lines[name][0]:
                 held.setdefault(f"{value:.3g} {panel.unit}", []).append(symbol(name))
     constant = "; ".join(f"{', '.join(sorted(names))} {value}" for value, names in held.items())
-    return [*found, f"constant: {constant}"] if constant else found
+    return [*notes, f"constant: {constant}"] if constant else notes
 
 
 def _draw_course(axes: Axes, shown: Path, stretched: float) -> None:

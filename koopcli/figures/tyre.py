@@ -75,11 +75,11 @@ def _curves(tyres: Tyres) -> list[TyreCurve]:
 
 def numbers(curves: Sequence[TyreCurve]) -> Mapping[str, Array]:
     """Slips and forces of every curve."""
-    found: dict[str, Array] = {}
+    columns: dict[str, Array] = {}
     for curve in curves:
         for name, unit in (("slip_angle", "rad"), ("lateral", "N"), ("slip_ratio", "1"), ("longitudinal", "N")):
-            found[f"{curve.label}/{name}"] = column(getattr(curve, name), "point", unit)
-    return found
+            columns[f"{curve.label}/{name}"] = column(getattr(curve, name), "point", unit)
+    return columns
 
 
 def draw(curves: Sequence[TyreCurve]) -> Figure:

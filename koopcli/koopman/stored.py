@@ -9,18 +9,18 @@ from koopcli.koopman.eigen.futures import Futures
 from koopcli.koopman.eigen.tabulated import Tabulated
 from koopcli.koopman.predictor.dynamics import Dynamics
 from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
-from koopcli.koopman.predictor.lifts import Lift
+from koopcli.koopman.predictor.lifts import Observables
 from koopcli.koopman.predictor.modes import Modes
 from koopcli.koopman.predictor.predictor import Predictor, UnpackLift
 from koopcli.records import Packed
 
 
-def _of_basis(unpack: Callable[[Packed], Lift]) -> UnpackLift:
+def _of_basis(unpack: Callable[[Packed], Observables]) -> UnpackLift:
     return lambda packed, _: unpack(packed)
 
 
-def _of_modes(unpack: Callable[[Packed, Modes], Lift]) -> UnpackLift:
-    def table(packed: Packed, dynamics: Dynamics) -> Lift:
+def _of_modes(unpack: Callable[[Packed, Modes], Observables]) -> UnpackLift:
+    def table(packed: Packed, dynamics: Dynamics) -> Observables:
         assert isinstance(dynamics, Diagonal), "a table is carried on by modes"
         return unpack(packed, dynamics.modes)
 

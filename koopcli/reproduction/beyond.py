@@ -60,8 +60,8 @@ def _ladder(first: Run, shown: Sequence[Column]) -> Table:
     queries = f"{count_text(ball(first.experiment).count)} queries (s)"
     header = ["initial states", "rates, lift", "simulated (s)", "lifted states", "build (s)", queries]
     header += [column.heading for column in shown]
-    said = "" if len(seeds) < 2 else f", seeds {' and '.join(map(str, seeds))} below one another"
-    return Table(f"Beyond the paper: RMSE in %, mean ± std (median){said}", header, rows, left=2)
+    suffix = "" if len(seeds) < 2 else f", seeds {' and '.join(map(str, seeds))} below one another"
+    return Table(f"Beyond the paper: RMSE in %, mean ± std (median){suffix}", header, rows, left=2)
 
 
 def _costs(scored: Scored | None) -> list[str]:
@@ -112,7 +112,7 @@ def _trust(runs: Sequence[Run]) -> Table:
 
 def notes(runs: Sequence[Run]) -> list[str]:
     """What the tables mean, and which of the expectations a run does not meet."""
-    said = list(NOTES)
+    notes = list(NOTES)
     for column, seed in _tested(columns(runs)):
         best = _best(column, seed)
         tasks = {row.label: blocks.evaluated(row, column.experiment, seed) for row in blocks.beside(column.experiment)}
@@ -125,12 +125,12 @@ def notes(runs: Sequence[Run]) -> list[str]:
         text = f"{nearest} on the same trajectories without images is {ratio:.0f} times worse"
         if not ratio >= TENFOLD:
             text = f"{nearest} is only {ratio:.2g} times worse than best-eigen, not ten times"
-        said.append(f"{column.heading}, seed {seed}: {text}.")
+        notes.append(f"{column.heading}, seed {seed}: {text}.")
     full = all(
         surface(run.experiment).count == EllipsoidSample.count and ball(run.experiment).count == BallSample.count
         for run in runs
     )
-    return said if full else [REDUCED, *said]
+    return notes if full else [REDUCED, *notes]
 
 
 def pictures(experiment: Experiment) -> list[Picture]:
@@ -158,7 +158,7 @@ def pictures(experiment: Experiment) -> list[Picture]:
     return [Picture(draw("frontier", frontier), "Error against simulated seconds."), *pictured]
 
 
-def measure(pipeline: Pipeline, cell: blocks.Cell, task: Task) -> Mapping[str, float]:
+def measure(pipeline: Pipeline, cell: blocks.BeyondCell, task: Task) -> Mapping[str, float]:
     """Seconds of the fit, when it was made, with those of building its lookup, and of predicting all test states, now;
     what it misses of the data.
     """

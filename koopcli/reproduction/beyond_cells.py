@@ -32,7 +32,7 @@ STATES = 3  # of the plant on tyres
 
 
 @dataclass(frozen=True)
-class Cell:
+class BeyondCell:
     """One predictor on the test states of one seed. ``block`` is the table it stands in, ``design`` its initial states
     and ``simulated`` the seconds of its trajectories; ``modes``: how many rates it has, where they are swept.
     """
@@ -60,7 +60,7 @@ class Row:
 AHEAD = FitEigen.of(window="horizon", eigenvalues="comb", cut=CUT, tabulate=TABLE, horizon=HORIZON)
 
 
-def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
+def cells(experiment: Experiment) -> Iterator[tuple[BeyondCell, Task]]:
     """Every cell with its evaluation."""
     seeds, everywhere = experiment.reproduce.seeds[:2], recipes.vehicles(experiment)
     for (vehicle, own), seed in product(everywhere, seeds):
@@ -73,14 +73,14 @@ def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
 
 def _cells(
     blocks: Mapping[str, Iterable[Row]], vehicle: str, own: Experiment, seed: int
-) -> Iterator[tuple[Cell, Task]]:
+) -> Iterator[tuple[BeyondCell, Task]]:
     """The rows of blocks put to a vehicle and to the test states of a seed."""
     for block, rows in blocks.items():
         for row in rows:
             task = evaluated(row, own, seed)
             simulation = task.input("predictor").ancestor("simulate").settings
             simulated = row.states.trajectories * simulation.steps * simulation.dt
-            yield Cell(block, row.label, row.design, simulated, vehicle, seed, row.modes), task
+            yield BeyondCell(block, row.label, row.design, simulated, vehicle, seed, row.modes), task
 
 
 def evaluated(row: Row, experiment: Experiment, seed: int) -> Task:
@@ -170,10 +170,10 @@ def beside(experiment: Experiment) -> Iterator[Row]:
 def ablation(experiment: Experiment) -> Iterator[Row]:
     """The best predictor with one ingredient less, named by what is there instead."""
     best, states = best_fit(experiment).but(trust=False), greedy(experiment)  # which moves no prediction
-    known = round(best.tabulate / experiment.simulate.dt) - round(
+    samples = round(best.tabulate / experiment.simulate.dt) - round(
         (written(best)["horizon"] or HORIZON) / experiment.simulate.dt
     )
-    shorter = best.but(rounds=0, tabulate=known * experiment.simulate.dt)
+    shorter = best.but(rounds=0, tabulate=samples * experiment.simulate.dt)
     less: list[tuple[str, SampleChoice, FitEigen]] = [
         ("rates: lattice", states, best.but(eigenvalues="dmd")),
         ("lift: linear", states, best.but(lift="linear")),

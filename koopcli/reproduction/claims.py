@@ -12,7 +12,7 @@ from koopcli.config.paper import BEST_ORDERS, BEST_RMSE
 from koopcli.koopman.edmd.fit import FitEdmd
 from koopcli.records import Meta
 from koopcli.reproduction import commands
-from koopcli.reproduction.commands import Command
+from koopcli.reproduction.commands import ClaimCommand
 from koopcli.reproduction.edmd_cells import Edmd, Training
 from koopcli.reproduction.report import Run, Table
 from koopcli.reproduction.texts import number_text
@@ -26,7 +26,7 @@ YAW_ORDERS = {"even": 10, "chebyshev": 10, "random": 7}
 
 
 @dataclass(frozen=True)
-class Finding:
+class Judgement:
     """What was found of a claim, line by line, and what follows."""
 
     here: Sequence[str]
@@ -39,8 +39,8 @@ class Claim:
 
     text: str
     paper: str
-    judged: Callable[[Run], Finding | None]
-    shows: Callable[[Run], Command]
+    judged: Callable[[Run], Judgement | None]
+    shows: Callable[[Run], ClaimCommand]
 
 
 def claims_table(run: Run) -> Table:
@@ -76,9 +76,9 @@ def _percent(value: float) -> str:
     return f"{number_text(value)} %" if math.isfinite(value) else "diverges"
 
 
-def _floor(run: Run) -> Finding:
+def _floor(run: Run) -> Judgement:
     """The best linear predictor, and the bilinear ones, on the first training draw."""
-    edmd, said = Edmd(run.experiment), list[str]()
+    edmd, lines = Edmd(run.experiment), list[str]()
     best: dict[str, float] = {}
     for kind in run.experiment.reproduce.excitations:
         linear = means(run, edmd.first, edmd.polynomials, kind)
@@ -88,25 +88,25 @@ def _floor(run: Run) -> Finding:
             figures = run.figures(edmd.evaluated(edmd.first, fit, kind))
             text += f", {fit.terms.kind} {_percent(mean(figures))}"
             best[kind] = min(mean(figures), best.get(kind, math.inf))
-        said.append(text)
+        lines.append(text)
     worst = max(best.values())
     if not worst < BEST_RMSE:
-        return Finding(said, "holds")
+        return Judgement(lines, "holds")
     ratio = f"{BEST_RMSE / worst:.0f} times better with {figures['functions']} functions"
-    return Finding(said, f"does not hold: bilinear terms are {ratio}, where a constant B has a floor")
+    return Judgement(lines, f"does not hold: bilinear terms are {ratio}, where a constant B has a floor")
 
 
-def _splines(run: Run) -> Finding:
+def _splines(run: Run) -> Judgement:
     """Polynomials of the paper's best order beside splines, wherever both were fitted."""
-    edmd, said, holds = Edmd(run.experiment), [], []
+    edmd, lines, holds = Edmd(run.experiment), [], []
     for training in edmd.both:
         polynomial, spline = (mean(run.figures(edmd.evaluated(training, fit))) for fit in (edmd.best, edmd.splines))
-        said.append(f"{training.name}: {_percent(polynomial)} (order {edmd.order}), splines {_percent(spline)}")
+        lines.append(f"{training.name}: {_percent(polynomial)} (order {edmd.order}), splines {_percent(spline)}")
         holds.append(polynomial < spline)
-    return Finding(said, _verdict(holds))
+    return Judgement(lines, _verdict(holds))
 
 
-def _best(run: Run) -> Finding | None:
+def _best(run: Run) -> Judgement | None:
     """The order of the smallest mean on every training draw, and over many where they were tried."""
     edmd = Edmd(run.experiment)
     if not set(BEST_ORDERS) & set(edmd.polynomials):
@@ -124,48 +124,48 @@ def _best(run: Run) -> Finding | None:
         total = counts.total()
         here.append(f"over {total} random draws: {', '.join(f'{order} in {n}' for order, n in sorted(counts.items()))}")
         verdict += f"; 6 to 8 in {sum(counts[order] for order in (6, 7, 8))} of {total}"
-    return Finding(here, verdict)
+    return Judgement(here, verdict)
 
 
-def _larger(run: Run) -> Finding | None:
+def _larger(run: Run) -> Judgement | None:
     """The largest basis over the best, and the textbook's regression beside it."""
     edmd = Edmd(run.experiment)
     if max(edmd.polynomials) <= BEST_ORDERS[-1]:
         return None
-    said, worse = [], []
+    lines, worse = [], []
     for training in edmd.trainings:
         errors = means(run, training, edmd.polynomials)
         best, last = min(errors.values()), max(errors)
-        said.append(f"{training.name}: {_percent(errors[last])} (order {last}), best {_percent(best)}")
+        lines.append(f"{training.name}: {_percent(errors[last])} (order {last}), best {_percent(best)}")
         worse.append(errors[last] > WORSE * best)
     text, textbook = _verdict(worse), means(run, edmd.first, edmd.textbook)
     if textbook:
         listed = ", ".join(f"{_percent(value)} (order {order})" for order, value in textbook.items())
-        said.append(f"by normal equations of monomials, {edmd.first.name}: {listed}")
+        lines.append(f"by normal equations of monomials, {edmd.first.name}: {listed}")
         if max(textbook.values()) > WORSE * min(textbook.values()):
             text += ", by extrapolation" if any(worse) else ""
             text += "; with the textbook's normal equations it does, by rounding"
-    return Finding(said, text)
+    return Judgement(lines, text)
 
 
-def _forces(run: Run) -> Finding | None:
+def _forces(run: Run) -> Judgement | None:
     """The best order trained with forces of one size, by which linear predictors are judged."""
     edmd, plan = Edmd(run.experiment), run.experiment.reproduce
     if len(plan.training_forces) < 2 or edmd.best.terms.kind != "linear":
         return None
-    said, holds = [], []
+    lines, holds = [], []
     for kind in [kind for kind in FORCED if kind in plan.excitations]:
         trainings = {force: replace(edmd.first, force=force) for force in plan.training_forces}
         errors = {f: mean(run.figures(edmd.evaluated(each, edmd.best, kind))) for f, each in trainings.items()}
-        said.append(f"{INPUTS[kind]}: {', '.join(f'±{f:g} N {_percent(value)}' for f, value in errors.items())}")
+        lines.append(f"{INPUTS[kind]}: {', '.join(f'±{f:g} N {_percent(value)}' for f, value in errors.items())}")
         smallest, *_, largest = errors.values()
         holds.append(largest > CLEAR * smallest)
-    return Finding(said, _verdict(holds)) if said else None
+    return Judgement(lines, _verdict(holds)) if lines else None
 
 
-def _yaw(run: Run) -> Finding | None:
+def _yaw(run: Run) -> Judgement | None:
     """The largest yaw-rate error up to the order to which rounding is harmless, of each kind of draw."""
-    edmd, said, holds = Edmd(run.experiment), [], []
+    edmd, lines, holds = Edmd(run.experiment), [], []
     for training in edmd.trainings:
         fits = {order: fit for order, fit in edmd.polynomials.items() if order <= YAW_ORDERS[training.draw]}
         if not fits:
@@ -173,9 +173,9 @@ def _yaw(run: Run) -> Finding | None:
         both = product(fits.values(), run.experiment.reproduce.excitations)
         tasks = [edmd.evaluated(training, fit, kind) for fit, kind in both]
         error = max(run.figures(task)["max_error"]["yaw_rate"] for task in tasks)
-        said.append(f"{training.name}: {error:.1e} rad/s up to order {max(fits)}")
+        lines.append(f"{training.name}: {error:.1e} rad/s up to order {max(fits)}")
         holds.append(error <= YAW_EXACT[training.draw])
-    return Finding(said, _verdict(holds, "holds, to rounding")) if said else None
+    return Judgement(lines, _verdict(holds, "holds, to rounding")) if lines else None
 
 
 def _verdict(holds: Sequence[bool], yes: str = "holds") -> str:

@@ -17,8 +17,8 @@ NOTHING = ("", "–")
 
 def is_numeric(cells: Sequence[str]) -> bool:
     """Whether a column is one of numbers: most of its cells that say anything begin with one."""
-    said = [cell for cell in cells if cell.strip() not in NOTHING]
-    return 2 * sum(LEADS.match(cell.strip()) is not None for cell in said) > len(said)
+    filled = [cell for cell in cells if cell.strip() not in NOTHING]
+    return 2 * sum(LEADS.match(cell.strip()) is not None for cell in filled) > len(filled)
 
 
 def aligned(cells: Sequence[str]) -> list[str]:
@@ -26,14 +26,14 @@ def aligned(cells: Sequence[str]) -> list[str]:
     kinds: dict[str, list[int]] = {}
     for i, cell in enumerate(cells):
         kinds.setdefault(NUMBER.sub("#", cell), []).append(i)
-    found = [""] * len(cells)
+    texts = [""] * len(cells)
     for rows in kinds.values():
         numbers = [NUMBER.findall(cells[i]) for i in rows]
         slots = [[_halves(number) for number in slot] for slot in zip(*numbers, strict=True)]
         widest = [tuple(max(half, key=len) for half in zip(*slot, strict=True)) for slot in slots]
         for i, own in zip(rows, numbers, strict=True):
-            found[i] = "".join(_joined(NUMBER.split(cells[i]), own, widest))
-    return found
+            texts[i] = "".join(_joined(NUMBER.split(cells[i]), own, widest))
+    return texts
 
 
 def _halves(number: str) -> tuple[str, str]:

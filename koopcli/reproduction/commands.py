@@ -16,7 +16,7 @@ SPLINED = (f"fit-edmd.basis.{SPLINES}.",)
 
 
 @dataclass(frozen=True)
-class Command:
+class ClaimCommand:
     """A command: its ``words``, what it ``sets``, and the changes of a run that it ``keeps``, by name or by a
     beginning that ends in a dot.
     """
@@ -32,16 +32,18 @@ class Command:
             told += ["--set", f"{name}={value}"]
         for change in run.changes:
             name = change.partition("=")[0]
-            kept = name in self.keeps or name.startswith(tuple(one for one in self.keeps if one.endswith(".")))
+            kept = name in self.keeps or name.startswith(tuple(start for start in self.keeps if start.endswith(".")))
             if name not in self.sets and kept:
                 told += ["--set", change]
         return shlex.join(["koop", *self.words, *told])
 
 
-def _evaluate(run: Run, keeps: tuple[str, ...] = (), **fit: object) -> Command:
+def _evaluate(run: Run, keeps: tuple[str, ...] = (), **fit: object) -> ClaimCommand:
     """The evaluation of a fit on the first training grid, under the inputs that claims are judged by."""
     sets = {f"fit-edmd.{name}": value for name, value in fit.items()}
-    return Command(("evaluate",), {**sets, **_first_grid(run), **_test(run)}, (*DATA, "test.", "evaluate.", *keeps))
+    return ClaimCommand(
+        ("evaluate",), {**sets, **_first_grid(run), **_test(run)}, (*DATA, "test.", "evaluate.", *keeps)
+    )
 
 
 def _first_grid(run: Run) -> dict[str, object]:
@@ -56,29 +58,29 @@ def _test(run: Run) -> dict[str, object]:
     return {} if edmd.inputs == edmd.box.excitation else {"test.excitation": edmd.inputs}
 
 
-def best(run: Run) -> Command:
+def best(run: Run) -> ClaimCommand:
     """The evaluation of the best predictor with few functions."""
     fit = Edmd(run.experiment).generator
     return _evaluate(run, basis=fit.basis.kind, order=written(fit)["order"], terms=fit.terms.kind)
 
 
-def splines(run: Run) -> Command:
+def splines(run: Run) -> ClaimCommand:
     """The evaluation of splines."""
     return _evaluate(run, SPLINED, basis=SPLINES)
 
 
-def textbook(run: Run) -> Command:
+def textbook(run: Run) -> ClaimCommand:
     """The evaluation of the largest basis by normal equations."""
     return _evaluate(run, order=TEXTBOOK_ORDERS[-1], solver="cholesky-monomials")
 
 
-def orders(run: Run) -> Command:
+def orders(run: Run) -> ClaimCommand:
     """The figure of errors against the order."""
     keeps = (*DATA, "test.", "evaluate.", "reproduce.orders", *SWEPT)
-    return Command(("plot", "orders"), {**_first_grid(run), **_test(run)}, keeps)
+    return ClaimCommand(("plot", "orders"), {**_first_grid(run), **_test(run)}, keeps)
 
 
-def forces(run: Run) -> Command:
+def forces(run: Run) -> ClaimCommand:
     """The evaluation of the best order trained with the largest forces."""
     edmd, largest = Edmd(run.experiment), run.experiment.reproduce.training_forces[-1]
     shown, sample = _evaluate(run, SWEPT, order=edmd.order), replace(edmd.first, force=largest).of(edmd.grid)
@@ -86,7 +88,7 @@ def forces(run: Run) -> Command:
     return replace(shown, sets=sets)
 
 
-def yaw(run: Run) -> Command:
+def yaw(run: Run) -> ClaimCommand:
     """The figure of a trajectory under random inputs."""
     sets = {"fit-edmd.order": Edmd(run.experiment).order, **_first_grid(run)}
-    return Command(("plot", "random-input"), sets, (*DATA, "test.point.", "plot.", *SWEPT))
+    return ClaimCommand(("plot", "random-input"), sets, (*DATA, "test.point.", "plot.", *SWEPT))

@@ -105,8 +105,8 @@ def notes(runs: Sequence[Run]) -> list[str]:
     full = (_samples(GridSample()), _tests(BoxSample()))
     sizes = {(_samples(edmd.grid), _tests(edmd.box)) for edmd in experiments}
     amplitudes = dict.fromkeys(f"{edmd.box.amplitude:g}" for edmd in experiments)
-    said = [note.format(paper=BEST_RMSE, amplitude=" or ".join(amplitudes)) for note in NOTES]
-    return said if sizes == {full} else [REDUCED, *said]
+    notes = [note.format(paper=BEST_RMSE, amplitude=" or ".join(amplitudes)) for note in NOTES]
+    return notes if sizes == {full} else [REDUCED, *notes]
 
 
 def tables(runs: Sequence[Run]) -> list[Table]:

@@ -17,7 +17,7 @@ from koopcli.simulation.samples.grid import GridSample
 from koopcli.simulation.samples.sample import Excitation
 from koopcli.stages import recipes, verdict
 from koopcli.stages.base import Task
-from koopcli.stages.makers import outlook
+from koopcli.stages.fits import outlook
 from koopcli.vehicles.plants.forces import Forces
 
 SWEEP, OTHERS, BASELINES, FORCES, PER_WHEEL, TEST_GRID, TEXTBOOK, DRAWN, DRAWS = (
@@ -39,7 +39,7 @@ SPLINES: str = "thin-plate"
 
 
 @dataclass(frozen=True)
-class Cell:
+class EdmdCell:
     """One predictor on one test set. ``block`` is what it belongs to, ``label`` what is special about it there."""
 
     block: str
@@ -177,7 +177,7 @@ class Edmd:
         return sample
 
 
-def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
+def cells(experiment: Experiment) -> Iterator[tuple[EdmdCell, Task]]:
     """Every cell of the experiment with its evaluation."""
     basis = experiment.fit_edmd.basis
     if not hasattr(basis, "order"):
@@ -193,7 +193,7 @@ def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
         yield from _row(edmd, DRAWS, "", training, fit, [edmd.inputs])
 
 
-def _others(edmd: Edmd) -> Iterator[tuple[Cell, Task]]:
+def _others(edmd: Edmd) -> Iterator[tuple[EdmdCell, Task]]:
     """Splines, bilinear terms and baselines, and the best order trained with forces of one size, beside one bilinear
     row, whose regression needs them no smaller.
     """
@@ -203,17 +203,17 @@ def _others(edmd: Edmd) -> Iterator[tuple[Cell, Task]]:
     for kind in plan.excitations:
         own = edmd.evaluated(first, edmd.experiment.fit_edmd, kind)
         for name, task in verdict.beside(edmd.experiment, own).items():
-            yield Cell(BASELINES, verdict.NAMES[name], first.name, None, kind), task
+            yield EdmdCell(BASELINES, verdict.NAMES[name], first.name, None, kind), task
     for force, fit in product(plan.training_forces, (edmd.best, edmd.bilinear)):
         yield from _row(edmd, FORCES, f"{{name}}, ±{force:g} N", replace(first, force=force), fit)
 
 
-def _settings(edmd: Edmd) -> Iterator[tuple[Cell, Task]]:
+def _settings(edmd: Edmd) -> Iterator[tuple[EdmdCell, Task]]:
     """Assumptions the paper leaves open, and how the textbook's regression fares."""
     experiment, first = edmd.experiment, edmd.first
-    other = Forces("axle" if experiment.plant_for(Forces) == Forces("wheel") else "wheel")
-    elsewhere = Edmd(replace(experiment, simulate=replace(experiment.simulate, plant=other)))
-    yield from _row(elsewhere, PER_WHEEL, f"force per {other.force_per}", first, edmd.best)
+    forces = Forces("axle" if experiment.plant_for(Forces) == Forces("wheel") else "wheel")
+    elsewhere = Edmd(replace(experiment, simulate=replace(experiment.simulate, plant=forces)))
+    yield from _row(elsewhere, PER_WHEEL, f"force per {forces.force_per}", first, edmd.best)
     side = round(edmd.box.count ** (1 / 3))
     label = f"{side}³ test states on a grid"
     yield from _row(edmd, TEST_GRID, label, first, edmd.best, layout="product", count=side**3)
@@ -234,13 +234,13 @@ def _row(
     fit: FitEdmd,
     kinds: Sequence[Excitation] = (),
     **tested: object,
-) -> Iterator[tuple[Cell, Task]]:
+) -> Iterator[tuple[EdmdCell, Task]]:
     """One fit under each kind of test inputs; ``{name}`` in its label is what it is called."""
     for kind in kinds or edmd.experiment.reproduce.excitations:
         task = edmd.evaluated(training, fit, kind, **tested)
         yield _cell(block, label, training, task.input("predictor"), kind), task
 
 
-def _cell(block: str, label: str, training: Training, predictor: Task, kind: Excitation) -> Cell:
+def _cell(block: str, label: str, training: Training, predictor: Task, kind: Excitation) -> EdmdCell:
     about = outlook(predictor)
-    return Cell(block, label.format(name=about.name), training.name, about.order, kind)
+    return EdmdCell(block, label.format(name=about.name), training.name, about.order, kind)

@@ -119,23 +119,23 @@ def _paper_table(shown: Sequence[Column], headline: Sequence[Meta], seeds: Seque
 def notes(runs: Sequence[Run]) -> list[str]:
     """What the tables mean, beginning with a word on runs of another size than the paper's."""
     mean, std = EIGEN_RMSE
-    said = [
+    notes = [
         "The lattice's exponentials are nearly dependent, so the smallest singular value kept decides the error; the "
         "same holds for the paper's own.",
         "A looked-up state is followed to the end of its trajectory, so the data must reach past the table by the "
         "horizon: with 1 s simulated and tabulated, predictions would leave the fitted window, where exponentials of "
         "alternating sign grow without bound (errors of thousands of percent), and are refused.",
     ]
-    said += [note for column in columns(runs) if (note := _beaten(column))]
+    notes += [note for column in columns(runs) if (note := _beaten(column))]
     if any(_as_in_the_paper(run.experiment) for run in runs):
-        said.insert(
+        notes.insert(
             0,
             f"The paper's {mean:g} ± {std:g} % is met on the later tyre of its authors ({DEFAULT_VEHICLE}), whose peak "
             "they doubled, with a tyre, a number of centres and a cut that were chosen knowing the answer: the paper "
             "states none of them, and the tables show how far each moves the error.",
         )
     full = all((count_text(surface(r.experiment).count), _tests(ball(r.experiment))) == SIZES for r in runs)
-    return said if full else [REDUCED, *said]
+    return notes if full else [REDUCED, *notes]
 
 
 def _as_in_the_paper(experiment: Experiment) -> bool:
@@ -159,7 +159,7 @@ def _beaten(column: Column) -> str | None:
     mean = headline["rmse"]["mean"]
     scores = by_vehicle([column], blocks.BASELINES, "label")
     others = {label: scored.figures["rmse"]["mean"] for (label,), (scored,) in scores.items() if scored is not None}
-    listed = ", ".join(f"{label} ({other:.3g} %)" for label, other in others.items() if other < mean)
+    listed = ", ".join(f"{label} ({error:.3g} %)" for label, error in others.items() if error < mean)
     return f"On {column.heading} the method's {mean:.3g} % is beaten by {listed}." if listed else None
 
 
@@ -168,9 +168,9 @@ def _tests(test: BallSample) -> str:
 
 
 def _about(fit: FitEigen) -> str:
-    said = written(fit)
-    splines = f", {said['centres']} centres" if said["boundary"] == "thin-plate" else ""
-    return f"{said['boundary']}{splines}{cut_text(said['cut'])}, sums of up to {said['degree']} rates"
+    settings = written(fit)
+    splines = f", {settings['centres']} centres" if settings["boundary"] == "thin-plate" else ""
+    return f"{settings['boundary']}{splines}{cut_text(settings['cut'])}, sums of up to {settings['degree']} rates"
 
 
 FIXED = {"test.seed": "reproduce.seeds=[4,5]", "test.ball.seed": "reproduce.seeds=[4,5]"}

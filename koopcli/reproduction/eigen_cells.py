@@ -14,7 +14,7 @@ from koopcli.simulation.samples.ball import BallSample
 from koopcli.simulation.samples.ellipsoid import EllipsoidSample
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
-from koopcli.stages.makers import outlook
+from koopcli.stages.fits import outlook
 from koopcli.vehicles.handling import G
 
 CUT = 1e-10  # of the readings with optimal boundary functions
@@ -26,7 +26,7 @@ HEADLINE, READINGS, CUTS, GRIP, BASELINES = "headline", "readings", "cuts", "gri
 
 
 @dataclass(frozen=True)
-class Cell:
+class EigenCell:
     """One reading of the method, or a baseline, on the test states of one seed. ``block`` is the table it stands in."""
 
     block: str
@@ -35,33 +35,33 @@ class Cell:
     seed: int
 
 
-def cells(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
+def cells(experiment: Experiment) -> Iterator[tuple[EigenCell, Task]]:
     """Every cell of the experiment with its evaluation."""
     plan, everywhere = experiment.reproduce, recipes.vehicles(experiment)
     first = plan.seeds[0]
     for (vehicle, own), seed in product(everywhere, plan.seeds):
-        yield Cell(HEADLINE, "as the experiment says", vehicle, seed), headline(own, seed)
+        yield EigenCell(HEADLINE, "as the experiment says", vehicle, seed), headline(own, seed)
     yield from _readings(experiment)
     for fit, cut in product((splines(experiment), optimal(experiment, None)), plan.cuts):
         label = f"{written(fit)['boundary']}, cut {cut:g}"
         task = evaluated(experiment, fit.but(cut=cut), first)
-        yield Cell(CUTS, label, experiment.vehicle_name, first), task
+        yield EigenCell(CUTS, label, experiment.vehicle_name, first), task
     for vehicle, own in everywhere:
         for scale in plan.mu_scales:
             label, gripping = f"grip × {scale:g}", own.with_parameters(mu_scale=scale * own.vehicle.mu_scale)
-            yield Cell(GRIP, label, vehicle, first), headline(gripping, first)
+            yield EigenCell(GRIP, label, vehicle, first), headline(gripping, first)
             task = evaluated(gripping, optimal(experiment, CUT), first)
-            yield Cell(GRIP, f"{label}, optimal{cut_text(CUT)}", vehicle, first), task
+            yield EigenCell(GRIP, f"{label}, optimal{cut_text(CUT)}", vehicle, first), task
         for task in beside(own, first):
-            yield Cell(BASELINES, outlook(task.input("predictor")).name, vehicle, first), task
+            yield EigenCell(BASELINES, outlook(task.input("predictor")).name, vehicle, first), task
 
 
-def _readings(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
+def _readings(experiment: Experiment) -> Iterator[tuple[EigenCell, Task]]:
     """Other readings of the paper's text."""
     seeds, main = experiment.reproduce.seeds, experiment.vehicle_name
 
-    def row(label: str, fit: FitEigen, of: Experiment = experiment) -> tuple[Cell, Task]:
-        return Cell(READINGS, label, main, seeds[0]), evaluated(of, fit, seeds[0])
+    def row(label: str, fit: FitEigen, of: Experiment = experiment) -> tuple[EigenCell, Task]:
+        return EigenCell(READINGS, label, main, seeds[0]), evaluated(of, fit, seeds[0])
 
     plain = splines(experiment)
     for centres in CENTRES:
@@ -72,7 +72,7 @@ def _readings(experiment: Experiment) -> Iterator[tuple[Cell, Task]]:
     for cut in (None, CUT):
         label, fit = f"optimal{cut_text(cut)}", optimal(experiment, cut)
         for (vehicle, own), seed in product(recipes.vehicles(experiment), seeds):
-            yield Cell(READINGS, label, vehicle, seed), evaluated(own, fit, seed)
+            yield EigenCell(READINGS, label, vehicle, seed), evaluated(own, fit, seed)
         for degree in (1, 3):
             yield row(f"{label}, sums of up to {degree}", fit.but(degree=degree))
         literal = f"{label}, {LITERAL_STEPS:g} s simulated, {LITERAL_TABLE:g} s tabulated"

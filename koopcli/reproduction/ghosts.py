@@ -59,18 +59,18 @@ def run(race: Race, experiment: Experiment, pipeline: Pipeline) -> Shown | str:
             dt = predictors[0].dt
             x0, u = swerve(plant, Edmd(experiment).grid.box, dt)
             x = simulate(plant.rhs, x0[np.newaxis], u[np.newaxis], dt, fastest_rate=plant.fastest_rate)[0]
-            said = f"one swerve, by axle forces of at most {abs(u).max() / 1e3:.1f} kN"
+            caption = f"one swerve, by axle forces of at most {abs(u).max() / 1e3:.1f} kN"
         else:
             scores = pipeline.make(race.evaluation).content
             test = pipeline.make(race.evaluation.input("trajectories")).content
             i, dt = typical(np.asarray(scores.rmse), np.asarray(test.x[:, 0])), test.dt
             x, u = np.asarray(test.x[i]), np.asarray(test.u[i])
-            said = f"test state {i}, from which {race.ghosts[0][0]} has its mean error; the car coasts"
+            caption = f"test state {i}, from which {race.ghosts[0][0]} has its mean error; the car coasts"
         labels = [label for label, _ in race.ghosts]
         predicted = [predictor.predict(x[0], u) for predictor in predictors]
     except InvalidValueError as error:
         return str(error)
-    return Shown(tuple(tracks(x, dict(zip(labels, predicted, strict=True)), dt)), dt, said, plant.parameters)
+    return Shown(tuple(tracks(x, dict(zip(labels, predicted, strict=True)), dt)), dt, caption, plant.parameters)
 
 
 def swerve(plant: ForceInput, box: Sequence[float], dt: float) -> tuple[FloatArray, FloatArray]:
@@ -98,26 +98,26 @@ def typical(rmse: FloatArray, x0: FloatArray) -> int:
 
     Raises ``InvalidValueError`` where every prediction diverged.
     """
-    known = np.isfinite(rmse)
-    if not known.any():
+    finite = np.isfinite(rmse)
+    if not finite.any():
         raise InvalidValueError("every prediction diverged")
-    forwards = known & (x0[:, 0] > np.abs(x0[:, 1]))
-    far = np.abs(rmse - rmse[known].mean())
-    return int(np.where(forwards if forwards.any() else known, far, np.inf).argmin())
+    forwards = finite & (x0[:, 0] > np.abs(x0[:, 1]))
+    far = np.abs(rmse - rmse[finite].mean())
+    return int(np.where(forwards if forwards.any() else finite, far, np.inf).argmin())
 
 
 def tracks(x: FloatArray, predicted: dict[str, FloatArray], dt: float) -> list[Track]:
     """The true car's track and those of the ``predicted`` states (samples, n_x), seen along its first velocity."""
     start = -math.atan2(x[0, 1], x[0, 0])
     true = path(x, dt, start)
-    found = [Track("true car", true, np.zeros(len(true)))]
+    tracks = [Track("true car", true, np.zeros(len(true)))]
     for label, states in predicted.items():
         with np.errstate(all="ignore"):
             ghost = path(states, dt, start)
             off = np.hypot(*(ghost - true)[:, :2].T)
         lost = np.logical_or.accumulate(~(off < LOST))
-        found.append(Track(label, np.where(lost[:, np.newaxis], np.nan, ghost), np.where(lost, np.nan, off)))
-    return found
+        tracks.append(Track(label, np.where(lost[:, np.newaxis], np.nan, ghost), np.where(lost, np.nan, off)))
+    return tracks
 
 
 def path(x: FloatArray, dt: float, heading: float = 0.0) -> FloatArray:

@@ -51,10 +51,10 @@ def _edmd_clause(run: Run) -> str | None:
         return None
     counted = f"{count_text(linear['functions'])} polynomials (EDMD, order {order})"
     stated = f"{BEST_RMSE} % is the paper's best" if order in BEST_ORDERS else f"the paper's best is {BEST_RMSE} %"
-    said = f"Under random inputs, {counted} {_misses(linear)} ({stated})"
+    clause = f"Under random inputs, {counted} {_misses(linear)} ({stated})"
     if bilinear is None:
-        return said
-    return f"{said}, {bilinear['functions']} bilinear functions of the same data {_misses(bilinear)}"
+        return clause
+    return f"{clause}, {bilinear['functions']} bilinear functions of the same data {_misses(bilinear)}"
 
 
 def _misses(figures: Meta) -> str:

@@ -43,16 +43,16 @@ def illustrate(plans: Sequence[Plan], pipeline: Pipeline) -> list[Illustration]:
 
     What cannot be drawn, as an evaluation where every prediction diverged, is left out with the reason.
     """
-    found = []
+    illustrations = []
     wanted = _wanted(plans)
     with pipeline.reporter.progress(f"figures of {plans[0].method.name}") as progress:
         for i, (run, picture) in enumerate(wanted):
             progress(i, len(wanted))
             try:
-                found.append(_drawn(run, picture, pipeline.make(picture.task), pipeline))
+                illustrations.append(_drawn(run, picture, pipeline.make(picture.task), pipeline))
             except InvalidValueError as error:
-                found.append(_undrawn(run, picture, str(error)))
-    return found
+                illustrations.append(_undrawn(run, picture, str(error)))
+    return illustrations
 
 
 def illustrations_there(plans: Sequence[Plan], pipeline: Pipeline, reason: str) -> list[Illustration]:
@@ -81,10 +81,10 @@ def _undrawn(run: Run, picture: Picture, reason: str) -> Illustration:
 def _drawn(run: Run, picture: Picture, made: Artefact, pipeline: Pipeline) -> Illustration:
     name = picture.task.settings.figure
     main = FIGURES[name].roles[:1]  # the artefact itself comes first
-    inputs = {tuple(key.split("/")): one for key, one in made.record.lineage.items()}
-    names = [one for (_, role), one in sorted(inputs.items(), key=lambda item: int(item[0][0])) if (role,) == main]
-    found = (pipeline.store.record(*one.split("/")) for one in names)
-    draws = tuple(one for one in found if one is not None)
+    inputs = {tuple(key.split("/")): full for key, full in made.record.lineage.items()}
+    names = [full for (_, role), full in sorted(inputs.items(), key=lambda item: int(item[0][0])) if (role,) == main]
+    records = (pipeline.store.record(*full.split("/")) for full in names)
+    draws = tuple(record for record in records if record is not None)
     making = command(run, picture, draws)
     return Illustration(name, picture.caption, run.label, making, made.content, made.record, draws, leads=picture.leads)
 
@@ -106,15 +106,15 @@ def command(run: Run, picture: Picture, draws: Sequence[Record]) -> str:
     told = list(run.changes)
     if alone != task:
         words += [record.name for record in draws]
-        told = [one for one in told if kind.takes == "predictor" and one.startswith(figure_tasks.TOLD_BESIDE)]
+        told = [option for option in told if kind.takes == "predictor" and option.startswith(figure_tasks.TOLD_BESIDE)]
         words += _labels(task, kind)
     if run.base != "paper" and (alone == task or kind.takes == "predictor"):
         words += ["--experiment", run.base]
     sources = [] if alone == task else [source for role, source in task.inputs if role.endswith("/predictor")]
-    for one in told:
-        ((setting, _),) = flat(parse_set([one]))
+    for option in told:
+        ((setting, _),) = flat(parse_set([option]))
         if why_idle(setting, run.experiment, lambda experiment: drawn(experiment, sources), [task]) is None:
-            words += ["--set", one]
+            words += ["--set", option]
     return shlex.join([*words, "-o", f"{name}.{task.settings.format}"])
 
 
@@ -122,20 +122,20 @@ def _labels(task: Task, kind: FigureKind) -> Iterator[str]:
     """What artefacts are called, where that is not what they would be called by their settings."""
     if kind.draws != "beside":
         return
-    evaluations = {role: one for role, one in task.inputs if role.endswith("/evaluation")}
+    evaluations = {role: evaluation for role, evaluation in task.inputs if role.endswith("/evaluation")}
     ordered = [evaluations[f"{i}/evaluation"] for i in range(len(evaluations))]
-    labels = [one.label for one in task.settings.series]
-    if labels != names([one.input("predictor") for one in ordered]):
+    labels = [entry.label for entry in task.settings.series]
+    if labels != names([evaluation.input("predictor") for evaluation in ordered]):
         yield from (word for label in labels for word in ("--label", label))
 
 
-def provenance(one: Illustration) -> Iterator[tuple[str, str]]:
+def provenance(illustration: Illustration) -> Iterator[tuple[str, str]]:
     """Where a picture comes from, as names and texts; nothing of the machine but its versions."""
-    assert one.record is not None
-    about = one.record.provenance
-    yield "artefact", one.record.name
-    if one.draws:
-        yield "draws", ", ".join(record.name for record in one.draws)
+    assert illustration.record is not None
+    about = illustration.record.provenance
+    yield "artefact", illustration.record.name
+    if illustration.draws:
+        yield "draws", ", ".join(record.name for record in illustration.draws)
     yield "made", f"{about['time'].replace('T', ' ')[:16]} UTC in {about['seconds']:.1f} s"
     packages = {name: version for name, version in about["versions"].items() if name != "koopcli"}
     koop = about["versions"].get("koopcli", "?")

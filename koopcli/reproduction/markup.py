@@ -85,7 +85,7 @@ def figure(shown: Illustration, *, brief: bool = False) -> Iterator[str]:
         if brief or many:
             yield command(shown.command)
         yield "<dl>"
-        yield from (f"<dt>{text(what)}</dt><dd>{text(said)}</dd>" for what, said in provenance(shown))
+        yield from (f"<dt>{text(what)}</dt><dd>{text(detail)}</dd>" for what, detail in provenance(shown))
         yield "</dl></details>"
     yield "</figcaption></figure>"
 

@@ -57,12 +57,12 @@ def race(methods: Sequence[Method], run: Run) -> Race:
 
 def opening(parts: Sequence[Part], ghosts: Shown | str, version: str) -> Opening:
     """The first screen of a report of ``parts``."""
-    dates = [scored.record.provenance["time"][:10] for part in parts for one in part.runs for scored in one.scored]
+    dates = [scored.record.provenance["time"][:10] for part in parts for run in part.runs for scored in run.scored]
     clauses = "; ".join(clause for part in parts if (clause := part.method.lead.clause(part.runs[0])) is not None)
     clauses = clauses or "none of the numbers of this screen was reached"
     shown = numbers(parts)
     about = [vehicles(parts, shown), f"computed {max(dates)}" if dates else "nothing computed", version]
-    picture = lead_picture([one for part in parts for one in part.illustrations])
+    picture = lead_picture([illustration for part in parts for illustration in part.illustrations])
     sentence = f"{clauses[0].upper()}{clauses[1:]}."
     return Opening(sentence, about, shown, picture, ghosts, list(missing(parts, ghosts)))
 
@@ -78,7 +78,7 @@ def vehicles(parts: Sequence[Part], shown: Table) -> str:
 def numbers(parts: Sequence[Part]) -> Table:
     """The paper's numbers beside those of every run: the first of each method, and more of the first."""
     each = [part.method.lead.numbers(part.runs) for part in parts]
-    rest = [found[0] for found in each[1:] if found]
+    rest = [numbers[0] for numbers in each[1:] if numbers]
     chosen: list[Number] = [*each[0][: max(1, MOST - len(rest))], *rest][:MOST]
     labels = list(dict.fromkeys(run.label for part in parts for run in part.runs))
     rows = []
@@ -90,13 +90,13 @@ def numbers(parts: Sequence[Part]) -> Table:
 
 
 def _owners(each: Sequence[Sequence[Number]], parts: Sequence[Part], chosen: Sequence[Number]) -> list[Part]:
-    return [next(part for found, part in zip(each, parts, strict=True) if number in found) for number in chosen]
+    return [next(part for numbers, part in zip(each, parts, strict=True) if number in numbers) for number in chosen]
 
 
 def lead_picture(illustrations: Sequence[Illustration]) -> Illustration | None:
     """The picture of the first screen: the first drawn one that leads, else the first that is drawn."""
-    drawn = [one for one in illustrations if one.drawing is not None]
-    return next((one for one in drawn if one.leads), drawn[0] if drawn else None)
+    drawn = [illustration for illustration in illustrations if illustration.drawing is not None]
+    return next((illustration for illustration in drawn if illustration.leads), drawn[0] if drawn else None)
 
 
 def missing(parts: Sequence[Part], ghosts: Shown | str) -> Iterator[str]:
@@ -118,9 +118,9 @@ def missing(parts: Sequence[Part], ghosts: Shown | str) -> Iterator[str]:
             yield f"This report leaves out {ALONE[name]}, which koop reproduce {OTHER[name]} adds."
     undrawn: dict[str, list[str]] = {}
     for part in parts:
-        for one in part.illustrations:
-            if one.drawing is None:
-                undrawn.setdefault(one.reason, []).append(one.figure)
+        for illustration in part.illustrations:
+            if illustration.drawing is None:
+                undrawn.setdefault(illustration.reason, []).append(illustration.figure)
     for reason, figures in undrawn.items():
         kind = "The figure" if len(figures) == 1 else "The figures"
         yield f"{kind} {', '.join(dict.fromkeys(figures))} could not be drawn: {reason}."

@@ -37,8 +37,8 @@ class Section:
 
 def page(first: Opening, sections: Sequence[Section], line: str, made_by: str) -> str:
     """The page. ``line`` is the command that makes it afresh."""
-    links = "".join(f'<a href="#{one.name}">{text(one.title)}</a>' for one in sections)
-    body = "".join("".join(_section(one, first.picture)) for one in sections)
+    links = "".join(f'<a href="#{section.name}">{text(section.title)}</a>' for section in sections)
+    body = "".join("".join(_section(section, first.picture)) for section in sections)
     scripts = "".join(f"<script>{_file(name)}</script>" for name in SCRIPTS)
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
@@ -54,9 +54,9 @@ def page(first: Opening, sections: Sequence[Section], line: str, made_by: str) -
 def _section(section: Section, opening: Illustration | None) -> Iterator[str]:
     """Figures, but for the one that opens the report, what they mean, and tables."""
     yield f'<section id="{section.name}"><h2>{text(section.title)}</h2><div class="figures">'
-    for one in section.illustrations:
-        if one is not opening:
-            yield from figure(one)
+    for illustration in section.illustrations:
+        if illustration is not opening:
+            yield from figure(illustration)
     meaning = f"<h3>What it means</h3>{listed(section.notes, 'notes')}" if section.notes else ""
     yield f"</div>{meaning}<h3>Tables</h3>"
     yield from map(folded, section.tables)

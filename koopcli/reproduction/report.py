@@ -174,7 +174,9 @@ def run_cells(plan: Plan, pipeline: Pipeline) -> Run:
 def cells_there(plan: Plan, pipeline: Pipeline) -> Run:
     """The run of a plan with the scores that the store has; nothing is made or measured."""
     kept = ((cell, task, pipeline.there(task)) for cell, task in plan.cells)
-    scored = (Scored(cell, task, one.figures, one.record) for cell, task, one in kept if one is not None)
+    scored = (
+        Scored(cell, task, artefact.figures, artefact.record) for cell, task, artefact in kept if artefact is not None
+    )
     return replace(plan.run, scored=tuple(scored))
 
 

@@ -53,10 +53,10 @@ def said(shown: Shown) -> str:
 
 def off_text(track: Track, dt: float) -> str:
     """How far a ghost is off at the end, or when it was lost."""
-    known = int(np.isfinite(track.off).sum())
-    if known == len(track.off):
+    samples = int(np.isfinite(track.off).sum())
+    if samples == len(track.off):
         return f"{number_text(float(track.off[-1]))} m off"
-    return f"more than {LOST:g} m off after {known * dt:.2f} s"
+    return f"more than {LOST:g} m off after {samples * dt:.2f} s"
 
 
 def _most(track: Track) -> str:

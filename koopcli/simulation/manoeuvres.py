@@ -77,11 +77,11 @@ class Manoeuvre:
 
     def inputs(self, driver: Driver, times: list[float]) -> list[list[float]]:
         """Inputs of the plant on wheels at each of ``times`` in s: steer, drive and brake in front, then behind."""
-        found = []
+        rows = []
         for t in times:
             c = self.controls(driver, t)
-            found.append([c.steer, c.drive[0], c.brake[0], 0.0, c.drive[1], c.brake[1]])
-        return found
+            rows.append([c.steer, c.drive[0], c.brake[0], 0.0, c.drive[1], c.brake[1]])
+        return rows
 
 
 def _ramp(t: float, start: float, length: float) -> float:

@@ -37,41 +37,41 @@ class Derived:
 
 def plants_of(p: VehicleParameters) -> list[str]:
     """The plants that the vehicle has all parameters for."""
-    found = []
+    plants = []
     for name, plant in PLANTS.items():
         try:
             plant().of(p)
         except InvalidValueError:
             continue
-        found.append(name)
-    return found
+        plants.append(name)
+    return plants
 
 
 def derived(p: VehicleParameters, dt: float) -> list[Derived]:
     """Loads, stiffnesses, steady cornering and wheel poles with the integration steps for samples of ``dt`` s."""
     front, rear = handling.wheel_loads(p)
-    found = [
+    numbers = [
         Derived("wheelbase", p.l_f + p.l_r, "m"),
         Derived("load of a front wheel", front, "N"),
         Derived("load of a rear wheel", rear, "N"),
     ]
     if p.lateral is None or p.longitudinal is None:
-        return found
+        return numbers
     stiffness = handling.cornering_stiffness(p)
     gradient, critical = handling.understeer_gradient(p), handling.critical_speed(p)
-    found += [
+    numbers += [
         Derived("cornering stiffness of the front axle", stiffness[0], "N/rad"),
         Derived("cornering stiffness of the rear axle", stiffness[1], "N/rad"),
         Derived("understeer gradient", gradient, "rad s^2/m"),
         Derived("critical speed", critical, "m/s"),
     ]
     if p.r_w is None or p.J_R is None:
-        return found
+        return numbers
     for speed in SPEEDS:
         pole = max(handling.wheel_poles(p, speed, TorqueInput.v_eps))
-        found.append(Derived(f"wheel pole at {speed:g} m/s", pole, "1/s"))
-        found.append(Derived(f"substeps at {speed:g} m/s", _substeps(p, speed, dt), "1"))
-    return found
+        numbers.append(Derived(f"wheel pole at {speed:g} m/s", pole, "1/s"))
+        numbers.append(Derived(f"substeps at {speed:g} m/s", _substeps(p, speed, dt), "1"))
+    return numbers
 
 
 def _substeps(p: VehicleParameters, speed: float, dt: float) -> float:

@@ -71,10 +71,10 @@ def _sample(rhs: Rhs, x: FloatArray, u: FloatArray, dt: float) -> tuple[FloatArr
     try:
         with np.errstate(over="ignore", invalid="ignore"), warnings.catch_warnings():  # of one that ends for it
             warnings.simplefilter("ignore")
-            found = solve_ivp(counted, (0.0, dt), x, method="LSODA", rtol=RELATIVE, atol=ABSOLUTE)
+            solution = solve_ivp(counted, (0.0, dt), x, method="LSODA", rtol=RELATIVE, atol=ABSOLUTE)
     except _StuckError:
         return x, FAILED
-    after: FloatArray = found.y[:, -1]
-    if not found.success:
+    after: FloatArray = solution.y[:, -1]
+    if not solution.success:
         return after, FAILED
     return after, 0 if (np.abs(after) <= LARGEST).all() else LOST

@@ -17,8 +17,8 @@ from koopcli.simulation.samples.greedy import GreedySample
 from koopcli.simulation.samples.grid import GridSample
 from koopcli.simulation.samples.sample import SampleChoice
 from koopcli.stages.base import Task
-from koopcli.stages.makers import LIFTED
-from koopcli.stages.usable import roles_of
+from koopcli.stages.fits import LIFTED
+from koopcli.stages.roles import roles_of
 
 PAGES = {"forces": "docs/paper.md", "slips": "docs/beyond.md", "wheels": "docs/wheels.md"}
 COASTING_ORDER = 10  # on even points, of which it needs one more
@@ -185,6 +185,6 @@ def _wheels(case: Case) -> Better | None:
 RULES = {"forces": _forces, "slips": _slips, "wheels": _wheels}
 
 
-def _same_fit(one: FitEdmd, other: FitEdmd) -> bool:
+def _same_fit(a: FitEdmd, b: FitEdmd) -> bool:
     """Whether two fits have the same functions and terms."""
-    return (one.basis, one.terms) == (other.basis, other.terms)
+    return (a.basis, a.terms) == (b.basis, b.terms)

@@ -33,20 +33,20 @@ class Making:
 
 
 @dataclass(frozen=True)
-class Made:
+class Messages:
     """What was ``said`` of each artefact on the way, by name, and what was ``warned`` of."""
 
     said: dict[str, str]
     warned: list[str]
 
 
-def make(making: Making) -> Made:
+def make(making: Making) -> Messages:
     """Make an artefact whose inputs are in the store. Raises ``OtherCodeError`` where other code has asked for it."""
     check_code(making.code)
     heard = _Heard()
     pipeline = Pipeline(Store(making.root, heard.warn), heard)
     pipeline.make(making.task)
-    return Made(pipeline.said, heard.warned)
+    return Messages(pipeline.said, heard.warned)
 
 
 def make_ahead(pipeline: Pipeline, tasks: Iterable[Task]) -> dict[Task, KoopError]:
@@ -63,25 +63,25 @@ def make_ahead(pipeline: Pipeline, tasks: Iterable[Task]) -> dict[Task, KoopErro
         return failed
     pipeline.workers.begin(pipeline.store.folder())
     with pipeline.reporter.progress("making") as progress:
-        for count, made in enumerate(_each(pipeline, missing, failed), 1):
+        for count, messages in enumerate(_each(pipeline, missing, failed), 1):
             progress(count, len(missing))
-            for text in made.warned:
+            for text in messages.warned:
                 pipeline.reporter.warn(text)
-            for name, what in made.said.items():
+            for name, what in messages.said.items():
                 pipeline.announce(name, what)
     return failed
 
 
-def _each(pipeline: Pipeline, missing: list[Task], failed: dict[Task, KoopError]) -> Iterator[Made]:
+def _each(pipeline: Pipeline, missing: list[Task], failed: dict[Task, KoopError]) -> Iterator[Messages]:
     """Make ``missing``, each as soon as its inputs are there; what depends on one that ``failed`` is not begun."""
     lacked = set(missing)
-    lacking = {task: {one for _, one in task.inputs if one in lacked} for task in missing}
+    lacking = {task: {step for _, step in task.inputs if step in lacked} for task in missing}
     waiting: dict[Task, list[Task]] = {}
     for task, inputs in lacking.items():
-        for one in inputs:
-            waiting.setdefault(one, []).append(task)
+        for step in inputs:
+            waiting.setdefault(step, []).append(task)
     ready = deque(task for task, inputs in lacking.items() if not inputs)
-    running: dict[Future[Made], Task] = {}
+    running: dict[Future[Messages], Task] = {}
     root = pipeline.store.root.absolute()
     while ready or running:
         while ready and len(running) < pipeline.workers.width:
@@ -90,17 +90,17 @@ def _each(pipeline: Pipeline, missing: list[Task], failed: dict[Task, KoopError]
         for future in pipeline.workers.done(running):
             task = running.pop(future)
             try:
-                made = pipeline.workers.result(future)
+                messages = pipeline.workers.result(future)
             except FATAL:
                 raise
             except KoopError as error:
                 failed[task] = error
                 continue
-            for other in waiting.get(task, ()):
-                lacking[other].discard(task)
-                if not lacking[other]:
-                    ready.appendleft(other)  # what is begun is finished first
-            yield made
+            for dependent in waiting.get(task, ()):
+                lacking[dependent].discard(task)
+                if not lacking[dependent]:
+                    ready.appendleft(dependent)  # what is begun is finished first
+            yield messages
 
 
 @dataclass(frozen=True)

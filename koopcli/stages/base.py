@@ -88,17 +88,17 @@ class Task:
 
     def input(self, role: str) -> Task:
         """The input ``role``. Raises ``UnknownNameError`` when its record is gone."""
-        found = dict(self.inputs).get(role)
-        if found is None:
+        task = dict(self.inputs).get(role)
+        if task is None:
             raise UnknownNameError(f"the {role} behind {self.name} is no longer in the store: make it afresh")
-        return found
+        return task
 
     def ancestor(self, stage: str) -> Task:
         """What :meth:`find` finds. Raises ``UnknownNameError`` when its record is gone."""
-        found = self.find(stage)
-        if found is None:
+        task = self.find(stage)
+        if task is None:
             raise UnknownNameError(f"the {stage} stage behind {self.name} is no longer in the store: make it afresh")
-        return found
+        return task
 
     def upstream(self) -> Iterator[Task]:
         """This task and all before it, nearest first."""

@@ -7,7 +7,7 @@ from koopcli.config.settings import Baseline
 from koopcli.koopman.edmd.fit import coverage
 from koopcli.koopman.scores.baselines import Forecast
 from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task
-from koopcli.stages.usable import finished
+from koopcli.stages.roles import finished
 
 NAMES = {
     "hold": "hold the first state",

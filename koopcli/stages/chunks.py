@@ -50,10 +50,10 @@ class Chunk:
         if inputs is None:
             inputs = {role: _content(self.root, name) for role, name in self.inputs}
             if self.given is not None:
-                there = _store(self.root).parts(self.key).read([self.given])
-                if self.given not in there:
+                stored = _store(self.root).parts(self.key).read([self.given])
+                if self.given not in stored:
                     raise _GoneError
-                inputs |= {"given": there[self.given]}
+                inputs |= {"given": stored[self.given]}
         chunk = STAGES[self.stage].chunk
         assert chunk is not None, "only a stage with chunks asks for them"
         return chunk(self.settings, inputs, slice(self.start, self.stop), self.progress)
@@ -103,12 +103,12 @@ class ChunkedWork:
         self.store.require(chunked + self.size - parts.size())  # the chunks, then the whole beside them
         if given is not None:
             _settle(parts, first - 1, given)
-        found = parts.read([chunk.i for chunk in chunks])
-        missing = [chunk for chunk in chunks if chunk.i not in found]
+        results = parts.read([chunk.i for chunk in chunks])
+        missing = [chunk for chunk in chunks if chunk.i not in results]
         if len(missing) < len(chunks):
             self.note(f"{len(chunks) - len(missing)} of {len(chunks)} chunks were already there")
         alone, root = self.workers.alone, self.store.folder()
-        jobs = missing if alone else [replace(one, root=root, at_hand=None, progress=silent) for one in missing]
+        jobs = missing if alone else [replace(chunk, root=root, at_hand=None, progress=silent) for chunk in missing]
         ready = count - sum(chunk.stop - chunk.start for chunk in missing)
         for chunk, warned in self.workers.each(commit, jobs, root):
             for text in warned:
@@ -116,9 +116,9 @@ class ChunkedWork:
             ready += chunk.stop - chunk.start
             if not alone:
                 self.progress(ready, count)
-        found |= parts.read([chunk.i for chunk in missing])
+        results |= parts.read([chunk.i for chunk in missing])
         # Others may have cleared chunks where no lock keeps them away, or have removed the inputs of a worker.
-        return [found[chunk.i] if chunk.i in found else chunk.compute() for chunk in chunks]
+        return [results[chunk.i] if chunk.i in results else chunk.compute() for chunk in chunks]
 
     def _chunk(self, whole: Chunk, i: int, rows: slice, count: int) -> Chunk:
         inside = within(self.progress, rows.start, rows.stop, count)
@@ -129,8 +129,8 @@ def _settle(parts: Parts, number: int, given: Packed) -> None:
     """Let what chunks are given lie there as part ``number``. What an interrupted command left is gone on with only if
     it was given the same to the last bit: another machine's survey may choose other directions, as good as these.
     """
-    there = parts.read([number]).get(number)
-    if there is None or data_digest(there) != data_digest(given):
+    stored = parts.read([number]).get(number)
+    if stored is None or data_digest(stored) != data_digest(given):
         parts.drop(number)
         parts.commit(number, given)
 

@@ -67,31 +67,31 @@ def compare(a: Packed, b: Packed, rtol: float, progress: Progress = silent) -> C
 
 def differing(a: Mapping[str, Any], b: Mapping[str, Any], rtol: float = 0.0) -> dict[str, tuple[Any, Any]]:
     """The nested facts that differ, by their full names; numbers only where they differ by more than ``rtol``."""
-    here, there = dict(flat(a)), dict(flat(b))
-    names = sorted(here.keys() | there.keys())
+    flat_a, flat_b = dict(flat(a)), dict(flat(b))
+    names = sorted(flat_a.keys() | flat_b.keys())
     return {
-        name: (here.get(name), there.get(name))
+        name: (flat_a.get(name), flat_b.get(name))
         for name in names
-        if not (name in here and name in there and _close(here[name], there[name], rtol))
+        if not (name in flat_a and name in flat_b and _close(flat_a[name], flat_b[name], rtol))
     }
 
 
 def _array(name: str, a: Array | None, b: Array | None, rtol: float) -> Difference:
     if a is None or b is None:
-        one = a or b
-        assert one is not None, "the name is of one of them"
-        shape, count = _shape(one.values)
+        array = a or b
+        assert array is not None, "the name is of one of them"
+        shape, count = _shape(array.values)
         return Difference(name, shape, (f"only in {'A' if b is None else 'B'}",), None, None, count, count)
     shape, count = _shape(a.values)
     layout = [
-        f"{what} {_words(here)} | {_words(there)}"
-        for what, here, there in (
+        f"{what} {_words(left)} | {_words(right)}"
+        for what, left, right in (
             ("shape", shape, _shape(b.values)[0]),
             ("type", np.dtype(a.values.dtype).newbyteorder("="), np.dtype(b.values.dtype).newbyteorder("=")),
             ("units", a.units, b.units),
             ("axes", a.axes, b.axes),
         )
-        if here != there
+        if left != right
     ]
     if shape != _shape(b.values)[0]:
         return Difference(name, shape, tuple(layout), None, None, count, count)
@@ -110,13 +110,13 @@ def _apart(a: Any, b: Any) -> tuple[Any, Any]:
     if a.dtype.kind not in "biufc" or b.dtype.kind not in "biufc":
         unequal = np.where(a == b, 0.0, np.inf)
         return unequal, unequal
-    wide = [one if one.dtype.kind == "c" else one.astype(np.longdouble) for one in (a, b)]
+    wide = [values if values.dtype.kind == "c" else values.astype(np.longdouble) for values in (a, b)]
     with np.errstate(all="ignore"):
-        missing = [np.isnan(one) for one in wide]
+        missing = [np.isnan(values) for values in wide]
         same = (wide[0] == wide[1]) | (missing[0] & missing[1])
         apart = np.where(same, 0.0, np.abs(wide[0] - wide[1]))
         apart = np.where(np.isnan(apart), np.inf, apart)
-        size = np.maximum(*(np.where(lost, 0.0, np.abs(one)) for lost, one in zip(missing, wide, strict=True)))
+        size = np.maximum(*(np.where(lost, 0.0, np.abs(values)) for lost, values in zip(missing, wide, strict=True)))
         share = np.where(np.isinf(apart), np.inf, apart / np.where(size > 0, size, 1.0))
     return apart, share
 
@@ -138,8 +138,8 @@ def _shape(values: Blocks) -> tuple[tuple[int, ...], int]:
 
 def _close(a: Any, b: Any, rtol: float) -> bool:
     if isinstance(a, (list, tuple)) and isinstance(b, (list, tuple)):
-        return len(a) == len(b) and all(_close(one, other, rtol) for one, other in zip(a, b, strict=True))
-    if any(isinstance(one, bool) or not isinstance(one, (int, float)) for one in (a, b)):
+        return len(a) == len(b) and all(_close(x, y, rtol) for x, y in zip(a, b, strict=True))
+    if any(isinstance(x, bool) or not isinstance(x, (int, float)) for x in (a, b)):
         return json.dumps(a, sort_keys=True) == json.dumps(b, sort_keys=True)
     if not (math.isfinite(a) and math.isfinite(b)):
         return a == b or (math.isnan(a) and math.isnan(b))

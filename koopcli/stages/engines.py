@@ -219,20 +219,20 @@ class Cluster:
     def _look(self, store: Path) -> None:
         """Refuse workers of other code, and those that do not see the store."""
         try:
-            found = self._client.run(_seen_from_here, str(store))
+            codes = self._client.run(_seen_from_here, str(store))
         except Exception as error:  # whatever a worker without koopcli makes of it
             raise InvalidValueError(
                 f"--cluster {self.address}: its workers cannot load koopcli {__version__}: install it where they run"
             ) from error
-        if not found:
+        if not codes:
             raise InvalidValueError(f"--cluster {self.address} has no workers: begin some with 'dask worker'")
-        for worker, (code, there) in found.items():
+        for worker, (code, shared) in codes.items():
             if code != _code():
                 raise InvalidValueError(
                     f"--cluster {self.address}: the worker {worker} has koopcli {code}, this is {_code()}: install one "
                     "koopcli everywhere and begin the workers again"
                 )
-            if not there:
+            if not shared:
                 raise InvalidValueError(
                     f"--cluster {self.address}: the worker {worker} does not see the store {store}: choose a --store "
                     "on a file system that all of them share"

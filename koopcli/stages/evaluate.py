@@ -15,8 +15,8 @@ from koopcli.koopman.scores.evaluation import Evaluation, evaluate, join, shorte
 from koopcli.progress import Progress, within
 from koopcli.records import Meta, Packed
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
-from koopcli.stages.makers import outlook
-from koopcli.stages.usable import finished
+from koopcli.stages.fits import outlook
+from koopcli.stages.roles import finished
 
 SAMPLES = 500_000  # scored together, however long the trajectories of a chunk are
 
@@ -39,8 +39,8 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
         and any(np.asarray(trajectories.u[rows]).any() for rows in blocks(slice(0, len(trajectories)), settings.chunk))
     ):
         context.warn("the test trajectories have inputs, of which this predictor knows nothing")
-    if other := _differing(predictor.plant, trajectories.plant):
-        context.warn(f"the test trajectories are of another vehicle or plant than the predictor: {', '.join(other)}")
+    if names := _differing(predictor.plant, trajectories.plant):
+        context.warn(f"the test trajectories are of another vehicle or plant than the predictor: {', '.join(names)}")
     if figures["outside"]:
         context.warn(
             f"{figures['outside']} of {n} test states lie outside the data, the convex hull of the training states: "
@@ -52,13 +52,13 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
 def _chunk(settings: Evaluate, inputs: Inputs, rows: slice, progress: Progress) -> Packed:
     trajectories = inputs["trajectories"].finished()
     assert settings.first is not None, "settled from the plant"
-    found = []
+    parts = []
     for block in blocks(rows, _together(trajectories.steps)):
         part = within(progress, block.start - rows.start, block.stop - rows.start, rows.stop - rows.start)
-        found.append(
+        parts.append(
             evaluate(inputs["predictor"], trajectories, block, settings.first, settings.restart, settings.relift, part)
         )
-    return join(found).pack()
+    return join(parts).pack()
 
 
 def _together(steps: int) -> int:
@@ -66,11 +66,11 @@ def _together(steps: int) -> int:
     return max(1, SAMPLES // steps)
 
 
-def _differing(one: Meta, other: Meta) -> list[str]:
+def _differing(a: Meta, b: Meta) -> list[str]:
     """What differs between two plants, by name."""
-    if not one or not other:
+    if not a or not b:
         return []
-    return sorted(name for name in {**one["vehicle"], **one, **other} if _at(one, name) != _at(other, name))
+    return sorted(name for name in {**a["vehicle"], **a, **b} if _at(a, name) != _at(b, name))
 
 
 def _at(plant: Meta, name: str) -> Any:

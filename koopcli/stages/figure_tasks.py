@@ -94,8 +94,8 @@ def _check(name: str, kind: FigureKind, artefacts: Sequence[Task]) -> None:
                 f"{' or '.join(kind.kinds)}"
             )
     if kind.draws == "beside":
-        for other in artefacts[1:]:
-            _check_shared(name, artefacts[0], other)
+        for artefact in artefacts[1:]:
+            _check_shared(name, artefacts[0], artefact)
 
 
 def _check_plant(name: str, predictor: Task, simulation: Simulate) -> None:
@@ -109,26 +109,26 @@ def _check_plant(name: str, predictor: Task, simulation: Simulate) -> None:
         )
 
 
-def _check_shared(name: str, one: Task, other: Task) -> None:
+def _check_shared(name: str, a: Task, b: Task) -> None:
     """Refuse two evaluations that did not score the same samples of the same trajectories."""
-    here, there = one.input("trajectories"), other.input("trajectories")
-    mine, theirs = here.settings.plant.kind, there.settings.plant.kind
+    test_a, test_b = a.input("trajectories"), b.input("trajectories")
+    mine, theirs = test_a.settings.plant.kind, test_b.settings.plant.kind
     if mine != theirs:
         raise InvalidValueError(
-            f"{one.name} is of the plant '{mine}', {other.name} of '{theirs}': the figure '{name}' draws predictors of "
+            f"{a.name} is of the plant '{mine}', {b.name} of '{theirs}': the figure '{name}' draws predictors of "
             "one plant, on one test set"
         )
-    if here != there:
+    if test_a != test_b:
         raise InvalidValueError(
-            f"the figure '{name}' draws predictors on one test set, but {one.name} is of {here.name} and {other.name} "
-            f"of {there.name}: evaluate each predictor with --on {here.name}"
+            f"the figure '{name}' draws predictors on one test set, but {a.name} is of {test_a.name} and {b.name} "
+            f"of {test_b.name}: evaluate each predictor with --on {test_a.name}"
         )
-    if one.settings.restart != other.settings.restart:
-        raise InvalidValueError(f"{one.name} and {other.name} restart differently: evaluate both with one --restart")
-    if one.settings.first != other.settings.first:
+    if a.settings.restart != b.settings.restart:
+        raise InvalidValueError(f"{a.name} and {b.name} restart differently: evaluate both with one --restart")
+    if a.settings.first != b.settings.first:
         raise InvalidValueError(
-            f"{one.name} is scored from sample k = {one.settings.first}, {other.name} from k = "
-            f"{other.settings.first}: evaluate both with one --set evaluate.first"
+            f"{a.name} is scored from sample k = {a.settings.first}, {b.name} from k = "
+            f"{b.settings.first}: evaluate both with one --set evaluate.first"
         )
 
 
@@ -158,8 +158,8 @@ def _series(
         series = tuple(Series(labels[task]) for task in artefacts)
     else:
         series = tuple(Series(label) for label in names([task.input("predictor") for task in artefacts]))
-    for one in series:
-        if series.count(one) > 1:
-            what = one.label if one.at is None else f"{kind.against} {one.at:g}, {one.label}"
+    for entry in series:
+        if series.count(entry) > 1:
+            what = entry.label if entry.at is None else f"{kind.against} {entry.at:g}, {entry.label}"
             raise InvalidValueError(f"several evaluations of {what}: name each once, and those of one experiment")
     return series

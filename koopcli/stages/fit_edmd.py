@@ -25,7 +25,7 @@ from koopcli.records import Meta, Packed
 from koopcli.simulation.samples.grid import GridSample
 from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task
 from koopcli.stages.predictors import figures, regression, size
-from koopcli.stages.usable import finished, roles_of
+from koopcli.stages.roles import finished, roles_of
 from koopcli.store.files import size_text
 from koopcli.vehicles.plants.forces import Forces
 from koopcli.vehicles.plants.plant import PlantChoice
@@ -45,17 +45,17 @@ def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
     basis = settings.basis_from(data, seen)
     _warn_of_centres(basis, seen, context)
     predictor = edmd.fit(data, basis, settings, context.progress, over, seen)
-    found = predictor.regression
-    if found.rank < found.directions:
+    regression = predictor.regression
+    if regression.rank < regression.directions:
         because = edmd.why_deficient(data, predictor, seen)
         context.warn(
-            f"the data determine {found.rank} of {found.directions} directions (condition "
-            f"{found.condition:.1e}){f' because {because}' if because else ''}; the others were set to zero: "
+            f"the data determine {regression.rank} of {regression.directions} directions (condition "
+            f"{regression.condition:.1e}){f' because {because}' if because else ''}; the others were set to zero: "
             "sample more states or inputs, lower the order or the number of centres, or use a --ridge"
         )
-    elif settings.plain and found.condition > HARMLESS:
+    elif settings.plain and regression.condition > HARMLESS:
         context.warn(
-            f"the normal equations of raw monomials have condition {found.condition:.1e}, squared: what this "
+            f"the normal equations of raw monomials have condition {regression.condition:.1e}, squared: what this "
             "predictor shows is rounding as much as the method; use the solver 'orthonormal'"
         )
     acting = predictor.dynamics.acting
@@ -147,24 +147,24 @@ def _check(task: Task) -> None:
 def _check_alike(data: list[Task]) -> None:
     """Refuse several trajectories that are not of one plant and period, or one of them twice."""
     names = [f.name for f in fields(Simulate) if f.name not in OF_ONE_RUN]
-    for other in data[1:]:
-        differing = [name for name in names if getattr(data[0].settings, name) != getattr(other.settings, name)]
+    for task in data[1:]:
+        differing = [name for name in names if getattr(data[0].settings, name) != getattr(task.settings, name)]
         if differing:
             raise InvalidValueError(
-                f"{data[0].name} and {other.name} differ in {', '.join(differing)}: one predictor is of one plant, "
+                f"{data[0].name} and {task.name} differ in {', '.join(differing)}: one predictor is of one plant, "
                 "vehicle and sampling period, so fit them apart"
             )
-    for i, one in enumerate(data):
-        if one in data[:i]:
-            raise InvalidValueError(f"{one.name} is named twice: its samples would count double, so name it once")
+    for i, task in enumerate(data):
+        if task in data[:i]:
+            raise InvalidValueError(f"{task.name} is named twice: its samples would count double, so name it once")
 
 
 def _check_samples(task: Task, data: list[Task]) -> None:
     """Refuse fewer samples than unknowns, as far as it is known how many there will be."""
-    starts = [one.find("sample") for one in data]
+    starts = [run.find("sample") for run in data]
     if all(start is not None for start in starts):
         runs = zip(starts, data, strict=True)
-        samples = sum(start.settings.trajectories * one.settings.steps for start, one in runs if start is not None)
+        samples = sum(start.settings.trajectories * run.settings.steps for start, run in runs if start is not None)
         inputs = len(_plant(task).inputs)
         edmd.check_samples(samples, _functions(task), inputs, task.settings.terms)
 
@@ -189,7 +189,7 @@ def _check_grid(task: Task, grid: GridSample) -> None:
 def _estimate(task: Task) -> Cost:
     N, terms = _functions(task), _terms(task)
     data = [task.input(role) for role in roles_of(dict(task.inputs))]
-    samples = sum(one.ancestor("sample").settings.trajectories * one.settings.steps for one in data)
+    samples = sum(run.ancestor("sample").settings.trajectories * run.settings.steps for run in data)
     sample, steps = data[0].ancestor("sample").settings, data[0].settings.steps
     crossed = isinstance(sample, GridSample) and steps == 1 and task.settings.solver == "orthonormal" and len(data) == 1
     rows = samples // (len(sample.levels) * sample.columns) if crossed else 2 * samples
@@ -198,8 +198,8 @@ def _estimate(task: Task) -> Cost:
 
 
 def _describe(figures: Meta, settings: FitEdmd) -> str:
-    found = f"{size(figures)}; {regression(figures)}, condition {figures['condition']:.2g}"
-    return f"{found}, solved by {figures['solved_by']}" if figures["solved_by"] else found
+    text = f"{size(figures)}; {regression(figures)}, condition {figures['condition']:.2g}"
+    return f"{text}, solved by {figures['solved_by']}" if figures["solved_by"] else text
 
 
 STAGE = Stage(

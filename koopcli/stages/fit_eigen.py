@@ -20,7 +20,7 @@ from koopcli.koopman.scores.metrics import summary
 from koopcli.records import FloatArray, Meta, Trajectories
 from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task, refuse_beyond_memory
 from koopcli.stages.predictors import figures, regression, size
-from koopcli.stages.usable import finished
+from koopcli.stages.roles import finished
 from koopcli.vehicles.plants import remembered_plant
 from koopcli.vehicles.symmetry import images
 
@@ -57,11 +57,11 @@ def _figures(predictor: Predictor) -> Meta:
 
 
 def _describe(figures: Meta, settings: FitEigen) -> str:
-    found = f"{size(figures)}; {figures['modes']} modes represent the data to {figures['missed']:.2g} %"
+    text = f"{size(figures)}; {figures['modes']} modes represent the data to {figures['missed']:.2g} %"
     if figures["trust"] is not None:
-        found += f"; median error in cross-validation {figures['trust']['median']:.2g} %"
+        text += f"; median error in cross-validation {figures['trust']['median']:.2g} %"
     cut = "rounding" if settings.window.cut is None else f"{settings.window.cut:g}"
-    return f"{found}; {regression(figures)} at cut {cut}"
+    return f"{text}; {regression(figures)} at cut {cut}"
 
 
 def _check_surface(x: FloatArray, trajectories: Trajectories, context: Context) -> None:

@@ -63,26 +63,26 @@ def cells(
         (tasks[place],) = plan(experiment)
         progress(count, len(grid))
     for error in misplaced:
-        if [other.setting for other in misplaced].count(error.setting) == len(grid):
+        if [refusal.setting for refusal in misplaced].count(error.setting) == len(grid):
             raise error
     _refuse_idle(grid, base, plan, tasks)
-    found: dict[Task, Cell] = {}
+    cells: dict[Task, Cell] = {}
     reasons: list[InvalidValueError] = []
     for place, task in tasks.items():
         placed = tuple(-1 if _idle(grid, tasks, place, axis) else i for axis, i in enumerate(place))
-        if task not in found:
+        if task not in cells:
             refused = ""
             try:
                 check(task)
             except InvalidValueError as error:
                 refused = str(error)
                 reasons.append(error)
-            found[task] = Cell(placed, task, refused)
-        elif placed != found[task].place:
-            found[task] = replace(found[task], same=(*found[task].same, placed))
-    if len(reasons) == len(found):
+            cells[task] = Cell(placed, task, refused)
+        elif placed != cells[task].place:
+            cells[task] = replace(cells[task], same=(*cells[task].same, placed))
+    if len(reasons) == len(cells):
         raise reasons[0]
-    return list(found.values())
+    return list(cells.values())
 
 
 def _experiment(base: str, settings: Sequence[tuple[str, Any]]) -> tuple[Experiment, list[MisplacedError]]:
@@ -136,12 +136,12 @@ def shared_out(every: Sequence[Cell], shards: int, cost: Callable[[Task], float]
     """
     seconds = [sum(cost(task) for task in _own(cell.task)) for cell in every]
     loads = [(0.0, i) for i in range(shards)]
-    found: list[list[int]] = [[] for _ in range(shards)]
+    shares: list[list[int]] = [[] for _ in range(shards)]
     for n in sorted(range(len(every)), key=lambda n: (-seconds[n], n)):
         load, i = heapq.heappop(loads)
-        found[i].append(n)
+        shares[i].append(n)
         heapq.heappush(loads, (load + seconds[n], i))
-    return [[every[n] for n in sorted(mine)] for mine in found]
+    return [[every[n] for n in sorted(mine)] for mine in shares]
 
 
 def order_grid(experiment: Experiment, **tested: object) -> Task:

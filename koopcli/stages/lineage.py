@@ -26,14 +26,14 @@ class Ancestor:
         """This artefact's record and all behind it, each with the roles that lead to it."""
         if self.record is not None:
             yield roles, self.record
-        for one in self.inputs:
-            yield from one.behind(f"{roles} / {one.role}".removeprefix(" / "))
+        for ancestor in self.inputs:
+            yield from ancestor.behind(f"{roles} / {ancestor.role}".removeprefix(" / "))
 
 
 def lineage(record: Record, store: Store, role: str = "", below: tuple[str, ...] = ()) -> Ancestor:
     """``record`` with everything that it was made from, as far as it is in the store; ``below``: made from it."""
     full = f"{record.stage}/{record.key}"
-    inputs = tuple(_input(store, role, one, (*below, full)) for role, one in record.lineage.items())
+    inputs = tuple(_input(store, role, name, (*below, full)) for role, name in record.lineage.items())
     state = "present" if store.has_object(record) else "missing"
     return Ancestor(role, full, record, state, inputs)
 

@@ -16,19 +16,19 @@ from koopcli.simulation.samples.point import PointSample
 from koopcli.simulation.samples.sample import INPUTS
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
-from koopcli.stages.makers import outlook
+from koopcli.stages.fits import outlook
 from koopcli.vehicles.plants.slips import Slips
 
 
 def names(predictors: Sequence[Task]) -> list[str]:
     """The labels of predictors. Settings that differ are added where several have one label."""
     plain = [outlook(task).name for task in predictors]
-    found = list(plain)
+    labels = list(plain)
     for name in dict.fromkeys(plain):
-        group = [i for i, other in enumerate(plain) if other == name]
+        group = [i for i, label in enumerate(plain) if label == name]
         for i, words in zip(group, differing([dict(settings_of(predictors[i])) for i in group]), strict=True):
-            found[i] = ", ".join([name, *words])
-    return found
+            labels[i] = ", ".join([name, *words])
+    return labels
 
 
 def points(against: str, evaluations: Sequence[Task], experiment: Experiment) -> tuple[Series, ...]:
@@ -38,21 +38,23 @@ def points(against: str, evaluations: Sequence[Task], experiment: Experiment) ->
     number on that axis.
     """
     locate, moved = AXES[against]
-    found = [locate(task, experiment) for task in evaluations]
-    plain = list(found)
+    series = [locate(task, experiment) for task in evaluations]
+    plain = list(series)
     for label in dict.fromkeys(point.label for point in plain):
         group = [i for i, point in enumerate(plain) if point.label == label]
-        said = differing([_beside(evaluations[i], moved) for i in group])
-        for i, words in zip(group, said, strict=True):
-            found[i] = Series(", ".join([label, *words]), plain[i].at)
-    return tuple(found)
+        differences = differing([_beside(evaluations[i], moved) for i in group])
+        for i, words in zip(group, differences, strict=True):
+            series[i] = Series(", ".join([label, *words]), plain[i].at)
+    return tuple(series)
 
 
 def differing(settings: Sequence[Mapping[str, Any]]) -> list[list[str]]:
     """Of each of several ``settings`` those that are not the same in all, in words, each once."""
-    known = list(dict.fromkeys(key for one in settings for key in one))
-    keys = [key for key in known if any(one.get(key) != settings[0].get(key) for one in settings)]
-    return [list(dict.fromkeys(f"{key.split('.')[-1]} {_short(one.get(key))}" for key in keys)) for one in settings]
+    candidates = list(dict.fromkeys(key for values in settings for key in values))
+    keys = [key for key in candidates if any(values.get(key) != settings[0].get(key) for values in settings)]
+    return [
+        list(dict.fromkeys(f"{key.split('.')[-1]} {_short(values.get(key))}" for key in keys)) for values in settings
+    ]
 
 
 def settings_of(task: Task) -> Iterator[tuple[str, Any]]:
@@ -63,13 +65,13 @@ def settings_of(task: Task) -> Iterator[tuple[str, Any]]:
 
 def _beside(evaluation: Task, moved: Sequence[str]) -> dict[str, Any]:
     """Every setting that two points of one curve have in common."""
-    found = {
+    settings = {
         name: value
         for name, value in settings_of(evaluation.input("predictor"))
         if not name.startswith((*moved, *UNTOLD))
     }
-    found |= {f"test/{name}": value for name, value in settings_of(evaluation.input("trajectories"))}
-    return found | {"first": evaluation.settings.first, "restart": evaluation.settings.restart}
+    settings |= {f"test/{name}": value for name, value in settings_of(evaluation.input("trajectories"))}
+    return settings | {"first": evaluation.settings.first, "restart": evaluation.settings.restart}
 
 
 def _order(evaluation: Task, experiment: Experiment) -> Series:
@@ -96,8 +98,8 @@ def _seconds(evaluation: Task, experiment: Experiment) -> Series:
     predictor = evaluation.input("predictor")
     simulation = predictor.ancestor("simulate")
     sample, steps = simulation.ancestor("sample").settings, simulation.settings
-    shown = {name: Slips.used(there.vehicle) for name, there in recipes.vehicles(experiment)}
-    vehicle = next((f"{name}: " for name, one in shown.items() if one == steps.vehicle), "")
+    shown = {name: Slips.used(variant.vehicle) for name, variant in recipes.vehicles(experiment)}
+    vehicle = next((f"{name}: " for name, used in shown.items() if used == steps.vehicle), "")
     fit, about = predictor.settings, outlook(predictor).name
     if isinstance(fit, FitEigen):
         parts = [fit.eigenvalues.kind, fit.lift.kind]

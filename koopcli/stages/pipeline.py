@@ -107,15 +107,15 @@ class Pipeline:
 
     def with_inputs(self, records: Sequence[Record]) -> list[Record]:
         """``records`` and all that they were made from, as far as it is in the store."""
-        found: dict[str, Record] = {}
+        behind: dict[str, Record] = {}
         waiting = list(records)
         while waiting:
             record = waiting.pop()
-            if record.key not in found:
-                found[record.key] = record
+            if record.key not in behind:
+                behind[record.key] = record
                 inputs = (self.store.record(*name.split("/")) for name in record.lineage.values())
-                waiting += [one for one in inputs if one is not None]
-        return list(found.values())
+                waiting += [record for record in inputs if record is not None]
+        return list(behind.values())
 
     def check(self, task: Task) -> None:
         """Refuse a task that cannot work, and warn of an odd vehicle once, without making anything."""
@@ -153,10 +153,10 @@ class Pipeline:
             if record is None:
                 return None
             inputs[role] = record
-        found = self.store.record(task.stage, key_of(recipe_of(task, inputs)))
-        if found is not None:
-            self._records[task] = found
-        return found
+        own = self.store.record(task.stage, key_of(recipe_of(task, inputs)))
+        if own is not None:
+            self._records[task] = own
+        return own
 
     def _obtain(self, task: Task) -> tuple[Record, Any, bool]:
         """Record, content, and whether it was there already."""
@@ -241,9 +241,9 @@ class Pipeline:
     def _rebuildable(self, task: Task, record: Record | None) -> None:
         """Refuse to replace a named artefact by something that today's code would not give the same key."""
         inputs = {role: self._known(upstream) for role, upstream in task.inputs}
-        known = {role: found for role, found in inputs.items() if found is not None}
-        complete = record is not None and set(known) == set(record.lineage)
-        if not complete or key_of(recipe_of(task, known)) != task.key:
+        present = {role: upstream for role, upstream in inputs.items() if upstream is not None}
+        complete = record is not None and set(present) == set(record.lineage)
+        if not complete or key_of(recipe_of(task, present)) != task.key:
             raise DamagedArtefactError(
                 f"{task.name} is damaged and cannot be made again, because its inputs are "
                 "gone or another version made it: run its command afresh"

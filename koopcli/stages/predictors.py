@@ -8,15 +8,15 @@ from koopcli.records import Meta
 
 def figures(predictor: Predictor) -> Meta:
     """The numbers of a fit that scripts read (`--json`)."""
-    found = predictor.regression
+    regression = predictor.regression
     return {
         "functions": predictor.functions,
-        "rank": found.rank,
-        "directions": found.directions,
-        "condition": found.condition,
+        "rank": regression.rank,
+        "directions": regression.directions,
+        "condition": regression.condition,
         "spectral_radius": predictor.spectral_radius,
         "horizon": predictor.horizon,
-        "solved_by": found.solved_by,
+        "solved_by": regression.solved_by,
     }
 
 

@@ -16,11 +16,9 @@ from koopcli.records import Meta
 from koopcli.simulation.samples.point import PointSample
 from koopcli.simulation.samples.sample import SampleChoice
 from koopcli.stages.base import Task
-from koopcli.stages.makers import MAKERS
-from koopcli.stages.usable import as_inputs
+from koopcli.stages.roles import as_inputs
 from koopcli.vehicles.plants import PLANTS
 
-FITS = tuple(MAKERS)
 BESIDE = (FitEdmd.of(basis="states"), FitEdmd.of(order=3), FitEdmd.of(order=5))  # of any trajectories, to compare with
 
 
@@ -80,8 +78,8 @@ def test_set(experiment: Experiment, plant: Simulate, **changed: object) -> Task
     kind = plant.plant.test
     if experiment.evaluate.restart is not None and isinstance(plant.plant, PointSample.meant_for):
         kind = PointSample.kind
-    there = replace(experiment, simulate=replace(experiment.simulate, dt=plant.dt))
-    settings = replace(there.test(kind, plant.vehicle), **changed)  # type: ignore[type-var]
+    alike = replace(experiment, simulate=replace(experiment.simulate, dt=plant.dt))
+    settings = replace(alike.test(kind, plant.vehicle), **changed)  # type: ignore[type-var]
     return Task("simulate", replace(plant, steps=settings.horizon), (("sample", sample(settings)),))
 
 
@@ -93,9 +91,9 @@ def driven(experiment: Experiment, plant: Simulate) -> Task:
 
 def remembered_simulation(about: Meta, dt: float) -> Simulate:
     """The simulation that a predictor remembers, for when its trajectories are no longer in the store."""
-    known = restored(Simulate, {**about, "dt": dt})
-    assert known.plant is not None, "remembered"
-    return known.settled(known.plant, 1)
+    simulate = restored(Simulate, {**about, "dt": dt})
+    assert simulate.plant is not None, "remembered"
+    return simulate.settled(simulate.plant, 1)
 
 
 def evaluation(experiment: Experiment, of: Task | None = None, on: Task | None = None) -> Task:
@@ -127,12 +125,12 @@ def mode_fits(fit: FitEigen, pairs: Sequence[int]) -> list[FitEigen]:
     ]
 
 
-def best_eigen(there: Experiment, budget: float | None = None) -> Experiment:
+def best_eigen(experiment: Experiment, budget: float | None = None) -> Experiment:
     """The experiment with the sample and the fit of best-eigen, for its own vehicle and period and its main budget."""
-    main = there.reproduce.budgets[0]
+    main = experiment.reproduce.budgets[0]
     best = load_experiment("best-eigen", {"sample": {"greedy": {"budget": main if budget is None else budget}}})
-    simulate = replace(there.simulate, plant=None, steps=None)
-    return replace(best, simulate=simulate, evaluate=there.evaluate)
+    simulate = replace(experiment.simulate, plant=None, steps=None)
+    return replace(best, simulate=simulate, evaluate=experiment.evaluate)
 
 
 def side_by_side(experiment: Experiment) -> list[Task]:
@@ -141,23 +139,23 @@ def side_by_side(experiment: Experiment) -> list[Task]:
     """
     main = predictor(experiment, "fit-eigen")
     others = beside(experiment, main.input("trajectories"))
-    return [evaluation(experiment, one) for one in dict.fromkeys((main, *others))]
+    return [evaluation(experiment, task) for task in dict.fromkeys((main, *others))]
 
 
 def vehicles(experiment: Experiment) -> list[tuple[str, Experiment]]:
     """The experiment's own vehicle and those beside it, each under a name of its own; the same one only once."""
-    found = [(experiment.vehicle_name, experiment)]
+    variants = [(experiment.vehicle_name, experiment)]
     for name in experiment.reproduce.beside:
-        there = experiment.with_vehicle(name)
+        variant = experiment.with_vehicle(name)
         label = Path(name).stem
-        known = [label for label, _ in found]
-        if label in known:
+        labels = [label for label, _ in variants]
+        if label in labels:
             label = f"{label} as its file has it"
-        if label in known:
-            label = f"{label} ({len(known)})"
-        if all(there.vehicle != one.vehicle for _, one in found):
-            found.append((label, there))
-    return found
+        if label in labels:
+            label = f"{label} ({len(labels)})"
+        if all(variant.vehicle != taken.vehicle for _, taken in variants):
+            variants.append((label, variant))
+    return variants
 
 
 def beside(experiment: Experiment, training: Task) -> Iterator[Task]:

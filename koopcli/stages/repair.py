@@ -58,10 +58,14 @@ def repair(store: Store, reporter: Reporter, findings: Sequence[Finding]) -> lis
     pipeline = Pipeline(store, reporter)
     done = _make_lost(pipeline, lost)
     again = ("damaged object", "missing object")
-    done |= {one.artefact for one in findings if one.kind in again and one.artefact and _make(pipeline, one.artefact)}
-    mended = {one for one in findings if one.artefact in done and one.damage}
-    mended |= {one for one in findings if one.kind == "damaged object" and not one.artefact}
-    return [replace(one, repaired=one in mended) for one in findings]
+    done |= {
+        finding.artefact
+        for finding in findings
+        if finding.kind in again and finding.artefact and _make(pipeline, finding.artefact)
+    }
+    mended = {finding for finding in findings if finding.artefact in done and finding.damage}
+    mended |= {finding for finding in findings if finding.kind == "damaged object" and not finding.artefact}
+    return [replace(finding, repaired=finding in mended) for finding in findings]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +79,9 @@ class _Lost:
 def _put_aside(store: Store, findings: Sequence[Finding]) -> list[_Lost]:
     """Move damaged files away; returns the recipes in damaged records that are still what their names say."""
     lost = []
-    for path in dict.fromkeys(one.path for one in findings if one.kind in ("damaged record", "damaged object")):
+    for path in dict.fromkeys(
+        finding.path for finding in findings if finding.kind in ("damaged record", "damaged object")
+    ):
         file = store.root / path
         if not _still_damaged(file):
             continue
@@ -90,8 +96,8 @@ def _still_damaged(path: Path) -> bool:
     if not os.path.lexists(path):
         return False
     if path.suffix == ".json":
-        found = look(path, path.parent.name, path.stem)
-        return found is not None and found.damaged
+        recorded = look(path, path.parent.name, path.stem)
+        return recorded is not None and recorded.damaged
     try:
         with open_regular(path) as (file, _):
             return hashlib.file_digest(file, "sha256").hexdigest() != path.stem
@@ -123,24 +129,24 @@ def _make_lost(pipeline: Pipeline, lost: Sequence[_Lost]) -> set[str]:
     """Make what has lost its record, as soon as all that it is made from is there; returns what was made."""
     done: set[_Lost] = set()
     while True:
-        there = (one.record for one in records(pipeline.store.root).values()) if set(lost) - done else ()
-        known = {record.data: record for record in there if record is not None}
-        made = {one for one in lost if one not in done and _make_from(pipeline, one, known)}
+        present = (recorded.record for recorded in records(pipeline.store.root).values()) if set(lost) - done else ()
+        by_data = {record.data: record for record in present if record is not None}
+        made = {artefact for artefact in lost if artefact not in done and _make_from(pipeline, artefact, by_data)}
         done |= made
         if not made:
-            return {one.full for one in done}
+            return {artefact.full for artefact in done}
 
 
-def _make_from(pipeline: Pipeline, lost: _Lost, known: dict[str, Record]) -> bool:
-    inputs = {role: known.get(data) for role, data in lost.recipe["inputs"].items()}
-    there = {role: record for role, record in inputs.items() if record is not None}
-    if len(there) < len(inputs):
+def _make_from(pipeline: Pipeline, lost: _Lost, by_data: dict[str, Record]) -> bool:
+    inputs = {role: by_data.get(data) for role, data in lost.recipe["inputs"].items()}
+    present = {role: record for role, record in inputs.items() if record is not None}
+    if len(present) < len(inputs):
         return False
     try:
         settings = STAGES[lost.recipe["stage"]].settings(lost.recipe["settings"])
-        named = tuple((role, pipeline.named(f"{one.stage}/{one.key}")) for role, one in there.items())
+        named = tuple((role, pipeline.named(f"{record.stage}/{record.key}")) for role, record in present.items())
         task = Task(lost.recipe["stage"], settings, named)
-        if f"{task.stage}/{key_of(recipe_of(task, there))}" != lost.full:  # another version made it
+        if f"{task.stage}/{key_of(recipe_of(task, present))}" != lost.full:  # another version made it
             return False
         made = pipeline.make(task).record
     except (*HOPELESS, KeyError, TypeError) as error:

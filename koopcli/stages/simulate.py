@@ -27,10 +27,10 @@ SLOWER = 100  # by so much are chunks of the reference solver smaller
 def _run(settings: Simulate, inputs: Inputs, context: Context) -> Trajectories:
     sample: Sample = inputs["sample"]
     parts = [Trajectories.unpack(part) for part in context.chunks(sample.trajectories, _rows(settings))]
-    found = replace(join(parts), product=sample.product)
-    assert found.course is not None, "of what was simulated here"
-    _report(found.course, context)
-    return found
+    trajectories = replace(join(parts), product=sample.product)
+    assert trajectories.course is not None, "of what was simulated here"
+    _report(trajectories.course, context)
+    return trajectories
 
 
 def _chunk(settings: Simulate, inputs: Inputs, rows: slice, progress: Progress) -> Packed:
@@ -60,11 +60,11 @@ def _report(course: Course, context: Context) -> None:
     ended = ~course.finished
     if not ended.any():
         return
-    said = []
+    parts = []
     for reason in np.unique(course.reason[ended]).tolist():
         rows = np.flatnonzero(course.reason == reason)
-        said.append(f"{len(rows)} of {len(ended)} {ENDS[reason]}, the first is number {rows[0]}")
-    text = "; ".join(said)
+        parts.append(f"{len(rows)} of {len(ended)} {ENDS[reason]}, the first is number {rows[0]}")
+    text = "; ".join(parts)
     if ended.all():
         remedy = ", or raise simulate.v_eps" if STIFF in course.reason else ", the steps or the inputs"
         raise InvalidValueError(f"no trajectory runs its whole length: {text}; lower simulate.dt{remedy}")
@@ -87,16 +87,16 @@ def _figures(trajectories: Trajectories) -> Meta:
 
 
 def _describe(figures: Meta, settings: Simulate) -> str:
-    found = f"{figures['trajectories']} trajectories × {figures['steps']} steps of {figures['dt']} s"
+    text = f"{figures['trajectories']} trajectories × {figures['steps']} steps of {figures['dt']} s"
     most = figures["substeps"]
     if most["max"] == 0:
-        found += ", by the reference solver"
+        text += ", by the reference solver"
     elif most["max"] > 1:
         span = (
             f"{most['min']} to {most['max']}, median {most['median']:g}" if most["min"] < most["max"] else most["max"]
         )
-        found += f", substeps at most: {span}"
-    return "; ".join([found, *(f"{count} {reason}" for reason, count in figures["ended"].items())])
+        text += f", substeps at most: {span}"
+    return "; ".join([text, *(f"{count} {reason}" for reason, count in figures["ended"].items())])
 
 
 def _plant(settings: Simulate) -> Plant:

@@ -53,15 +53,15 @@ class _Judge:
         yield from own
         inputs = {}
         for role, full in record.lineage.items():
-            there = self._records.get(full)
-            if there is None:
+            upstream = self._records.get(full)
+            if upstream is None:
                 yield f"its {role}, {full.partition('/')[0]}, is gone"
-            elif there.data != record.recipe["inputs"].get(role):
+            elif upstream.data != record.recipe["inputs"].get(role):
                 yield f"its {role} has come out different since"
             elif self.why(full) is not None:
                 yield f"its {role} is stale"
             else:
-                inputs[role] = there
+                inputs[role] = upstream
         if not own and len(inputs) == len(record.lineage):
             task = Task(record.stage, settings_of(record))
             if key_of(recipe_of(task, inputs)) != record.key:
@@ -79,13 +79,13 @@ def _own_reasons(record: Record, version: int) -> Iterator[str]:
         cause = error.__cause__
         yield f"settings that are no longer known ({cause if isinstance(cause, KoopError) else 'one is missing'})"
         return
-    there = dict(flat(record.recipe["settings"]))
-    changed = sorted(name for name in here.keys() | there.keys() if not _same(here, there, name))
+    recorded = dict(flat(record.recipe["settings"]))
+    changed = sorted(name for name in here.keys() | recorded.keys() if not _same(here, recorded, name))
     if changed:
         yield f"settings that are written differently here: {', '.join(changed)}"
     if "drawn_by" in here and here["drawn_by"] != source_digest():
         yield "drawn by other code"
 
 
-def _same(here: Mapping[str, Any], there: Mapping[str, Any], name: str) -> bool:
-    return name in here and name in there and canonical(here[name]) == canonical(there[name])
+def _same(here: Mapping[str, Any], recorded: Mapping[str, Any], name: str) -> bool:
+    return name in here and name in recorded and canonical(here[name]) == canonical(recorded[name])

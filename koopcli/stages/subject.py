@@ -12,7 +12,7 @@ from koopcli.config.shipped import Fingerprint, fingerprint
 from koopcli.errors import UnknownNameError
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
-from koopcli.stages.makers import MAKERS, outlook
+from koopcli.stages.fits import FITS, outlook
 
 
 def subject(artefacts: Sequence[Task], simulated: Callable[[Task], Simulate]) -> Subject:
@@ -21,28 +21,28 @@ def subject(artefacts: Sequence[Task], simulated: Callable[[Task], Simulate]) ->
     ``simulated`` finds the simulation behind a predictor whose trajectories are gone.
     """
     steps = list(dict.fromkeys(step for task in artefacts for step in task.upstream()))
-    predictors = [step for step in steps if step.stage in MAKERS]
+    predictors = [step for step in steps if step.stage in FITS]
     vehicles = dict.fromkeys(_simulations(steps, predictors, simulated)) or dict.fromkeys(_samples(steps))
-    return Subject(tuple(vehicles), tuple(outlook(one).name for one in predictors))
+    return Subject(tuple(vehicles), tuple(outlook(predictor).name for predictor in predictors))
 
 
 def of_vehicles(experiment: Experiment, parameters: Sequence[str]) -> Subject:
     """The experiment's vehicles, of which ``parameters`` are drawn."""
-    there = (one.vehicle for _, one in recipes.vehicles(experiment))
-    return Subject(tuple(dict.fromkeys(fingerprint(vehicle, tuple(parameters)) for vehicle in there)))
+    vehicles = (variant.vehicle for _, variant in recipes.vehicles(experiment))
+    return Subject(tuple(dict.fromkeys(fingerprint(vehicle, tuple(parameters)) for vehicle in vehicles)))
 
 
 def _simulations(
     steps: Sequence[Task], predictors: Sequence[Task], simulated: Callable[[Task], Simulate]
 ) -> Iterator[Fingerprint]:
-    known = [step.settings for step in steps if step.stage == "simulate"]
-    if not known:
-        for one in predictors:
+    simulations = [step.settings for step in steps if step.stage == "simulate"]
+    if not simulations:
+        for predictor in predictors:
             try:
-                known.append(simulated(one))
+                simulations.append(simulated(predictor))
             except UnknownNameError:  # its record is gone too
                 continue
-    for settings in known:
+    for settings in simulations:
         yield fingerprint(settings.vehicle, settings.plant.uses())
 
 

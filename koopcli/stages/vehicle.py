@@ -30,17 +30,17 @@ def doubts(step: Task) -> Iterator[str]:
 
 def makes_the_same(experiment: Experiment, tasks: Sequence[Task]) -> str | None:
     """What is said where the vehicle that was named last makes the same ``tasks`` as the one in its place would."""
-    other = experiment.before_naming()
+    unnamed = experiment.before_naming()
     steps = [step for task in tasks for step in task.upstream() if step.key is None]
     steps = [step for step in steps if step.stage in ("sample", "simulate")]
-    if other is None or other.vehicle_name == experiment.vehicle_name:
+    if unnamed is None or unnamed.vehicle_name == experiment.vehicle_name:
         return None
     if not steps:
         drawn = [task.settings.figure for task in tasks if task.stage == "plot"]
         plain = [figure for figure in drawn if not FIGURES[figure].parameters]
         return f"the figure '{plain[0]}' draws nothing of {experiment.vehicle_name}" if plain else None
-    names = f"{experiment.vehicle_name} and {other.vehicle_name}"
-    differing = [name for name in NAMES if getattr(experiment.vehicle, name) != getattr(other.vehicle, name)]
+    names = f"{experiment.vehicle_name} and {unnamed.vehicle_name}"
+    differing = [name for name in NAMES if getattr(experiment.vehicle, name) != getattr(unnamed.vehicle, name)]
     if not differing:
         return f"{names} have the same parameters: what is made is the same"
     if any(name in _used(step) for step in steps for name in differing):

@@ -13,9 +13,9 @@ from koopcli.records import Meta
 from koopcli.stages import recipes
 from koopcli.stages.base import Task
 from koopcli.stages.fit_edmd import OF_ONE_RUN
+from koopcli.stages.fits import LIFTED
 from koopcli.stages.lineage import lineage
-from koopcli.stages.makers import LIFTED
-from koopcli.stages.usable import roles_of
+from koopcli.stages.roles import roles_of
 from koopcli.store import Record, Store
 
 LINEAR = FitEdmd.of(basis="total", order=1)
@@ -41,9 +41,9 @@ def beside(experiment: Experiment, evaluation: Task) -> dict[str, Task]:
     }
     trajectories = evaluation.input("trajectories")
     return {
-        name: Task("evaluate", evaluation.settings, (("predictor", other), ("trajectories", trajectories)))
-        for name, other in others.items()
-        if (other.stage, other.settings) != (predictor.stage, predictor.settings)
+        name: Task("evaluate", evaluation.settings, (("predictor", task), ("trajectories", trajectories)))
+        for name, task in others.items()
+        if (task.stage, task.settings) != (predictor.stage, predictor.settings)
     }
 
 
@@ -51,7 +51,7 @@ def fitted_to_test_data(evaluation: Record, store: Store) -> bool:
     """Whether a predictor was fitted to what it is tested on, by whatever name: the same data, or the beginning of
     trajectories that one sample gives.
     """
-    behind = {one.role: one for one in lineage(evaluation, store).inputs}
+    behind = {ancestor.role: ancestor for ancestor in lineage(evaluation, store).inputs}
     predictor, test = behind["predictor"], behind["trajectories"].record
     if predictor.record is None or predictor.record.stage not in LIFTED:
         return False
@@ -59,15 +59,17 @@ def fitted_to_test_data(evaluation: Record, store: Store) -> bool:
     roles = roles_of(data)
     if evaluation.recipe["inputs"]["trajectories"] in [data[role] for role in roles]:
         return True
-    fitted = [one.record for one in predictor.inputs if one.role in roles and one.record is not None]
+    fitted = [
+        ancestor.record for ancestor in predictor.inputs if ancestor.role in roles and ancestor.record is not None
+    ]
     return test is not None and any(_begins(test, whole) for whole in fitted)
 
 
 def _begins(part: Record, whole: Record) -> bool:
     """Whether trajectories are the first steps of others, or all of them."""
-    here, there = part.recipe["settings"], whole.recipe["settings"]
-    same = all(here.get(name) == value for name, value in there.items() if name not in OF_ONE_RUN)
-    return same and part.recipe["inputs"] == whole.recipe["inputs"] and here["steps"] <= there["steps"]
+    of_part, of_whole = part.recipe["settings"], whole.recipe["settings"]
+    same = all(of_part.get(name) == value for name, value in of_whole.items() if name not in OF_ONE_RUN)
+    return same and part.recipe["inputs"] == whole.recipe["inputs"] and of_part["steps"] <= of_whole["steps"]
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ class Verdict:
 def verdict(figures: Meta, others: Mapping[str, Meta]) -> Verdict:
     """The plain verdict on the ``figures`` of an evaluation beside those of ``others``."""
     mean = _mean(figures)
-    better = [name for name, other in others.items() if not mean < _mean(other)]
+    better = [name for name, scores in others.items() if not mean < _mean(scores)]
     if figures["diverged"]:
         return Verdict(False, f"the predictor cannot be trusted: {figures['diverged']} of its predictions diverge")
     if better:

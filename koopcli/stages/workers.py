@@ -97,9 +97,9 @@ class Workers:
     def done(self, running: Collection[Future[Result]]) -> set[Future[Result]]:
         """Those of ``running`` that are done, once there are any; says so where nobody is left to do them."""
         while True:
-            found = wait(running, PATIENCE, FIRST_COMPLETED).done
-            if found:
-                return found
+            finished = wait(running, PATIENCE, FIRST_COMPLETED).done
+            if finished:
+                return finished
             stalled = self._engine.stalled()
             if stalled is not None:
                 self.warn(stalled)

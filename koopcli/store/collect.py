@@ -19,7 +19,7 @@ from koopcli.progress import Progress, silent
 from koopcli.store.files import DAY, HOUR, make_folder, own_name, storage_errors
 from koopcli.store.locks import if_free
 from koopcli.store.store import Store
-from koopcli.store.survey import DIGEST, File, Recorded, Survey, look, object_path, pinned, records, survey
+from koopcli.store.survey import DIGEST, File, Recorded, Stock, look, object_path, pinned, records, survey
 from koopcli.text import printable
 
 NAMES = re.compile(rf"(?<![0-9a-f]){DIGEST}(?![0-9a-f])".encode())
@@ -41,141 +41,141 @@ class Removal:
 
 
 @dataclass(frozen=True)
-class Plan:
+class CollectionPlan:
     """What a collection removes; ``kept`` artefacts stay. ``clock`` says how the age of files was measured."""
 
     removals: tuple[Removal, ...]
     kept: int
-    there: Survey = field(repr=False)
+    there: Stock = field(repr=False)
     clock: str = ""
 
     @property
     def size(self) -> int:
         """Bytes that are freed."""
-        return sum(one.size for one in self.removals)
+        return sum(removal.size for removal in self.removals)
 
 
-def plan(store: Store, grace: float, *, delete: bool = False, progress: Progress = silent) -> Plan:
+def plan(store: Store, grace: float, *, delete: bool = False, progress: Progress = silent) -> CollectionPlan:
     """What is neither pinned nor younger than ``grace`` seconds, nor was used to make any such thing.
 
     Raises ``DamagedArtefactError`` for a damaged pin, as nobody knows what it keeps.
     """
-    there = survey(store.root, progress)
-    damaged = [printable(label) for label, names in there.pins.items() if names is None]
+    stock = survey(store.root, progress)
+    damaged = [printable(label) for label, names in stock.pins.items() if names is None]
     if damaged:
         raise DamagedArtefactError(
             f"the pin {damaged[0]} is damaged and what it keeps unknown, so nothing is removed: "
             f"koop unpin {damaged[0]}, and pin again what is to stay"
         )
-    if not any((there.objects, there.removing, there.records, there.chunks, there.locks, there.temporary)):
-        return Plan((), 0, there)
-    now, clock = _clock(store, there, delete)
-    kept = _kept(there, now - grace)
+    if not any((stock.objects, stock.removing, stock.records, stock.chunks, stock.locks, stock.temporary)):
+        return CollectionPlan((), 0, stock)
+    now, clock = _clock(store, stock, delete)
+    kept = _kept(stock, now - grace)
     removals = [
-        *_artefacts(store, there, kept, now - max(grace, HOUR)),
-        *_unfinished(store, there, now - grace),
+        *_artefacts(store, stock, kept, now - max(grace, HOUR)),
+        *_unfinished(store, stock, now - grace),
         *(
             Removal("temporary file", _relative(store, file), file.size, (file,))
-            for file in there.temporary
+            for file in stock.temporary
             if now - file.mtime > DAY
         ),
         *(
             Removal("lock", _relative(store, file), file.size, (file,))
-            for file in there.locks
+            for file in stock.locks
             if now - file.mtime >= max(grace, HOUR) and _free(file.path)
         ),
     ]
-    return Plan(tuple(removals), len(kept), there, clock)
+    return CollectionPlan(tuple(removals), len(kept), stock, clock)
 
 
-def remove(store: Store, planned: Plan, progress: Progress = silent) -> list[Removal]:
+def remove(store: Store, planned: CollectionPlan, progress: Progress = silent) -> list[Removal]:
     """Remove what was planned, but for what is wanted or in use meanwhile; returns what was removed."""
     done: list[Removal] = []
     waiting: list[Removal] = []
     with storage_errors(store.root):
         _put_back(store, planned.there)
-        for i, one in enumerate(planned.removals):
+        for i, removal in enumerate(planned.removals):
             progress(i, len(planned.removals))
-            if one.kind == "orphan object":
-                waiting.append(one)
-            elif one.kind == "artefact":
-                if _remove_record(store, one, planned.there):
-                    waiting.append(one)
-            elif _remove_files(store, one):
-                done.append(one)
-        left = _remove_objects(store, {digest for one in waiting for digest in one.objects}, planned.there)
-    for one in waiting:
-        if not left & set(one.objects):
-            done.append(one)
-        elif one.kind == "artefact":  # somebody has committed equal data
-            done.append(replace(one, size=one.files[0].size))
+            if removal.kind == "orphan object":
+                waiting.append(removal)
+            elif removal.kind == "artefact":
+                if _remove_record(store, removal, planned.there):
+                    waiting.append(removal)
+            elif _remove_files(store, removal):
+                done.append(removal)
+        left = _remove_objects(store, {digest for removal in waiting for digest in removal.objects}, planned.there)
+    for removal in waiting:
+        if not left & set(removal.objects):
+            done.append(removal)
+        elif removal.kind == "artefact":  # somebody has committed equal data
+            done.append(replace(removal, size=removal.files[0].size))
     return done
 
 
-def _kept(there: Survey, before: float) -> set[str]:
+def _kept(stock: Stock, before: float) -> set[str]:
     """Full names of what is pinned or young, and of all that it was made from. What does not read here is kept.
 
     What was made again is as young as its object, whatever the age of its record.
     """
-    waiting = [name for names in there.pins.values() for name in names or []]
-    for full, one in there.records.items():
-        file = there.objects.get(one.record.object) if one.record is not None else None
-        if one.record is None or max(one.file.mtime, file.mtime if file else 0.0) > before:
+    waiting = [name for names in stock.pins.values() for name in names or []]
+    for full, recorded in stock.records.items():
+        file = stock.objects.get(recorded.record.object) if recorded.record is not None else None
+        if recorded.record is None or max(recorded.file.mtime, file.mtime if file else 0.0) > before:
             waiting.append(full)
-    return _closure(there.records, waiting)
+    return _closure(stock.records, waiting)
 
 
-def _closure(known: dict[str, Recorded], waiting: Sequence[str]) -> set[str]:
-    by_key = {one.key: full for full, one in known.items()}
-    found: set[str] = set()
+def _closure(records: dict[str, Recorded], waiting: Sequence[str]) -> set[str]:
+    by_key = {recorded.key: full for full, recorded in records.items()}
+    closure: set[str] = set()
     left = list(waiting)
     while left:
-        one = known.get(left.pop())
-        if one is not None and one.full not in found:
-            found.add(one.full)
-            if one.record is not None:
-                left += one.record.lineage.values()
+        recorded = records.get(left.pop())
+        if recorded is not None and recorded.full not in closure:
+            closure.add(recorded.full)
+            if recorded.record is not None:
+                left += recorded.record.lineage.values()
             else:
-                left += [by_key[key] for key in _named(one) if key in by_key]
-    return found
+                left += [by_key[key] for key in _named(recorded) if key in by_key]
+    return closure
 
 
-def _named(one: Recorded) -> set[str]:
+def _named(recorded: Recorded) -> set[str]:
     """Every digest and key that a record names, in any format."""
-    if one.record is not None:
-        return {one.record.object}
-    return {text.decode() for text in NAMES.findall(one.text)}
+    if recorded.record is not None:
+        return {recorded.record.object}
+    return {text.decode() for text in NAMES.findall(recorded.text)}
 
 
-def _artefacts(store: Store, there: Survey, kept: set[str], before: float) -> Iterator[Removal]:
+def _artefacts(store: Store, stock: Stock, kept: set[str], before: float) -> Iterator[Removal]:
     """Records that nobody keeps, each with its object once no other record names it; then objects without any."""
-    wanted = {digest for full in kept for digest in _named(there.records[full])}
+    wanted = {digest for full in kept for digest in _named(stock.records[full])}
     freed: set[str] = set()
-    for full in sorted(there.records.keys() - kept):
-        one = there.records[full]
-        if one.record is None:
+    for full in sorted(stock.records.keys() - kept):
+        recorded = stock.records[full]
+        if recorded.record is None:
             continue
-        digest = one.record.object
-        file = there.objects.get(digest) if digest not in wanted | freed else None
-        size = one.file.size + (file.size if file else 0)
+        digest = recorded.record.object
+        file = stock.objects.get(digest) if digest not in wanted | freed else None
+        size = recorded.file.size + (file.size if file else 0)
         freed |= {digest} if file else set()
-        yield Removal("artefact", one.record.name, size, (one.file,), (digest,) if file else (), full)
-    if any(one.record is None for one in there.records.values()):
+        yield Removal("artefact", recorded.record.name, size, (recorded.file,), (digest,) if file else (), full)
+    if any(recorded.record is None for recorded in stock.records.values()):
         return  # what looks like an orphan may belong to a record that does not read here
-    used = wanted | there.named_by().keys()
-    for digest, file in there.objects.items():
+    used = wanted | stock.named_by().keys()
+    for digest, file in stock.objects.items():
         if digest not in used and file.mtime < before:
             yield Removal("orphan object", _relative(store, file), file.size, (file,), (digest,))
 
 
-def _unfinished(store: Store, there: Survey, before: float) -> Iterator[Removal]:
+def _unfinished(store: Store, stock: Stock, before: float) -> Iterator[Removal]:
     """Chunks of what nobody has gone on with."""
-    for key, files in there.chunks.items():
+    for key, files in stock.chunks.items():
         if all(file.mtime <= before for file in files) and _free(store.root / "locks" / f"{key}.lock"):
             yield Removal("chunks", f"partial/{key}", sum(file.size for file in files), tuple(files), key=key)
 
 
-def _clock(store: Store, there: Survey, delete: bool) -> tuple[float, str]:
+def _clock(store: Store, stock: Stock, delete: bool) -> tuple[float, str]:
     """Now, by the file system that gave the files their times, and how it was found where not in the usual way."""
     temporary = store.root / "tmp"
     probe = temporary / own_name()
@@ -190,21 +190,21 @@ def _clock(store: Store, there: Survey, delete: bool) -> tuple[float, str]:
     except StorageError:
         if delete:
             raise
-        return there.newest(), "the store is read-only: ages are counted from the newest file in it"
+        return stock.newest(), "the store is read-only: ages are counted from the newest file in it"
 
 
-def _remove_record(store: Store, one: Removal, there: Survey) -> bool:
+def _remove_record(store: Store, removal: Removal, stock: Stock) -> bool:
     """Remove the record of an artefact, unless it was pinned, made again or used meanwhile."""
     pins = pinned(store.root)
-    (file,) = one.files
-    stage, _, key = one.key.partition("/")
+    (file,) = removal.files
+    stage, _, key = removal.key.partition("/")
     now = look(file.path, stage, key)
     if now is None or now.file != file or any(names is None for names in pins.values()):
         return False
-    if now.record is not None and not _untouched(store, now.record.object, there):
+    if now.record is not None and not _untouched(store, now.record.object, stock):
         return False
     wanted = [name for names in pins.values() for name in names or []]
-    if one.key in _closure(there.records, wanted):
+    if removal.key in _closure(stock.records, wanted):
         return False
     try:
         file.path.unlink()
@@ -213,35 +213,35 @@ def _remove_record(store: Store, one: Removal, there: Survey) -> bool:
     return True
 
 
-def _remove_files(store: Store, one: Removal) -> bool:
+def _remove_files(store: Store, removal: Removal) -> bool:
     """Remove litter, while nobody holds the lock that it is or belongs to."""
-    if one.kind == "temporary file":
-        one.files[0].path.unlink(missing_ok=True)
+    if removal.kind == "temporary file":
+        removal.files[0].path.unlink(missing_ok=True)
         return True
-    lock = one.files[0].path
-    if one.kind == "chunks":
-        lock = store.root / "locks" / f"{one.key}.lock"
+    lock = removal.files[0].path
+    if removal.kind == "chunks":
+        lock = store.root / "locks" / f"{removal.key}.lock"
         make_folder(lock.parent)
         lock.touch()  # so that it can be held
     with if_free(lock) as free:
         if free:
-            for file in one.files:
+            for file in removal.files:
                 file.path.unlink(missing_ok=True)
             lock.unlink(missing_ok=True)
-    if one.kind == "chunks" and free:
+    if removal.kind == "chunks" and free:
         with suppress(OSError):  # somebody has gone on with it
-            one.files[0].path.parent.rmdir()
+            removal.files[0].path.parent.rmdir()
     return free
 
 
-def _remove_objects(store: Store, digests: set[str], there: Survey) -> set[str]:
+def _remove_objects(store: Store, digests: set[str], stock: Stock) -> set[str]:
     """Remove objects that no record names; returns those that are still there."""
     away: dict[str, Path] = {}
     suffix = own_name()
     for digest in sorted(digests):
         path = object_path(store.root, digest)
         with suppress(FileNotFoundError):
-            if _untouched(store, digest, there):
+            if _untouched(store, digest, stock):
                 aside = path.with_name(f"{path.name}.{suffix}")
                 os.replace(path, aside)
                 away[digest] = aside
@@ -249,13 +249,13 @@ def _remove_objects(store: Store, digests: set[str], there: Survey) -> set[str]:
     return {digest for digest in digests if object_path(store.root, digest).exists()}
 
 
-def _untouched(store: Store, digest: str, there: Survey) -> bool:
+def _untouched(store: Store, digest: str, stock: Stock) -> bool:
     """Whether an object is as it was when it was looked at; one that somebody has put again is young."""
     try:
         about = object_path(store.root, digest).lstat()
     except FileNotFoundError:
-        return digest not in there.objects
-    then = there.objects.get(digest)
+        return digest not in stock.objects
+    then = stock.objects.get(digest)
     return then is not None and (about.st_size, about.st_mtime) == (then.size, then.mtime)
 
 
@@ -263,7 +263,7 @@ def _settle(store: Store, away: dict[str, Path]) -> None:
     """Put objects that were moved away back where a record names them, and remove the others."""
     if not away:
         return
-    named = {digest for one in records(store.root).values() for digest in _named(one)}
+    named = {digest for recorded in records(store.root).values() for digest in _named(recorded)}
     for digest, aside in away.items():
         with suppress(FileNotFoundError):
             if digest in named:
@@ -272,9 +272,9 @@ def _settle(store: Store, away: dict[str, Path]) -> None:
                 aside.unlink()
 
 
-def _put_back(store: Store, there: Survey) -> None:
+def _put_back(store: Store, stock: Stock) -> None:
     """End what a collection that was cut off had begun; one that is still at work meets nothing it does not expect."""
-    for digest, file in there.removing:
+    for digest, file in stock.removing:
         _settle(store, {digest: file.path})
 
 

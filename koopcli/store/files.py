@@ -115,11 +115,11 @@ def open_regular(path: Path, flags: int = os.O_NOFOLLOW) -> Iterator[tuple[io.Fi
             raise UntrustedFileError("it is not a regular file") from error
         raise
     try:
-        found = os.fstat(descriptor)
-        if not stat.S_ISREG(found.st_mode):
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
             raise UntrustedFileError("it is not a regular file")
         with open(descriptor, "rb", buffering=0, closefd=False) as file:
-            yield file, found.st_size
+            yield file, status.st_size
     finally:
         os.close(descriptor)
 

@@ -98,12 +98,12 @@ def from_open(opened: io.FileIO) -> Packed:
         try:
             if len(content) > MEMORY_LIMIT:
                 return _packed(file, texts)
-            found = loaded(_packed(file, texts, IN_MEMORY))
+            packed = loaded(_packed(file, texts, IN_MEMORY))
         except BaseException:
             file.close()
             raise
         file.close()
-        return found
+        return packed
 
 
 class _Opened(io.FileIO):

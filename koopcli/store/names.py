@@ -28,14 +28,14 @@ def store_root(given: str | Path | None = None) -> Path:
 
 def index(root: Path) -> list[tuple[str, str]]:
     """(stage, key) of every record, by stage; none where there is no store. Raises ``OSError``."""
-    found = []
+    matches = []
     try:
         for stage in os.scandir(root / "records"):
             if stage.is_dir():
-                found += [(stage.name, KEY.fullmatch(file.name)) for file in os.scandir(stage)]
+                matches += [(stage.name, KEY.fullmatch(file.name)) for file in os.scandir(stage)]
     except FileNotFoundError:
         return []
-    return sorted((stage, match[1]) for stage, match in found if match)
+    return sorted((stage, match[1]) for stage, match in matches if match)
 
 
 def is_name(name: object) -> bool:

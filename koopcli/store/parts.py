@@ -29,17 +29,17 @@ class Parts:
 
     def read(self, numbers: Collection[int]) -> dict[int, Packed]:
         """Those of the chunks ``numbers`` that this code made, verified; a damaged one is removed."""
-        found: dict[int, Packed] = {}
+        parts: dict[int, Packed] = {}
         with storage_errors(self._folder):
             for path in self._files():
                 match = _own(path)
-                if match and int(match[1]) in numbers and int(match[1]) not in found:
+                if match and int(match[1]) in numbers and int(match[1]) not in parts:
                     packed = self._verified(path, match[2])
                     if packed is None:
                         path.unlink(missing_ok=True)
                     else:
-                        found[int(match[1])] = packed
-        return found
+                        parts[int(match[1])] = packed
+        return parts
 
     def size(self) -> int:
         """Bytes of what is there."""

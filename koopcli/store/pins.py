@@ -30,19 +30,19 @@ def unpin(store: Store, label: str) -> None:
         try:
             _path(store, label).unlink()
         except FileNotFoundError as error:
-            known = ", ".join(pins(store)) or "none"
-            raise UnknownNameError(f"'{label}' is not pinned (pinned: {known})") from error
+            labels = ", ".join(pins(store)) or "none"
+            raise UnknownNameError(f"'{label}' is not pinned (pinned: {labels})") from error
 
 
 def pins(store: Store) -> dict[str, list[str]]:
     """label -> names "stage/key" that it keeps; a damaged pin keeps nothing and is warned about."""
     with reading_errors(store.root):
-        found = pinned(store.root)
-    for label, names in found.items():
+        by_label = pinned(store.root)
+    for label, names in by_label.items():
         if names is None:
-            known = printable(label)
-            store.warn(f"the pin {known} is damaged: `koop unpin {known}`, and pin again")
-    return {label: names or [] for label, names in found.items()}
+            shown = printable(label)
+            store.warn(f"the pin {shown} is damaged: `koop unpin {shown}`, and pin again")
+    return {label: names or [] for label, names in by_label.items()}
 
 
 def label_of(record: Record) -> str:

@@ -85,15 +85,15 @@ class Record:
 def _well_formed(record: Record) -> bool:
     """Whether each entry has its form: paths are made of them."""
     return (
-        all(isinstance(one, dict) for one in (record.recipe, record.lineage, record.provenance))
-        and all(isinstance(one, str) and DIGEST.fullmatch(one) for one in (record.object, record.data))
+        all(isinstance(value, dict) for value in (record.recipe, record.lineage, record.provenance))
+        and all(isinstance(digest, str) and DIGEST.fullmatch(digest) for digest in (record.object, record.data))
         and type(record.size) is int
         and record.size >= 0
         and all(map(is_name, record.lineage.values()))
         and isinstance(record.recipe.get("stage"), str)
         and type(record.recipe.get("version")) is int
         and all(isinstance(record.recipe.get(name), dict) for name in ("settings", "inputs"))
-        and all(isinstance(one, str) and DIGEST.fullmatch(one) for one in record.recipe["inputs"].values())
+        and all(isinstance(digest, str) and DIGEST.fullmatch(digest) for digest in record.recipe["inputs"].values())
     )
 
 

@@ -91,8 +91,8 @@ class Store:
             raise UnknownNameError(
                 f"the name '{text}' is empty, as a failed command leaves it: name an artefact, `koop ls` lists them"
             )
-        known = [(stage, key) for stage, key in self.index() if is_name(f"{stage}/{key}")]
-        matches = [(s, k) for s, k in known if f"{s}/{k}".startswith(text) or k.startswith(text)]
+        pairs = [(stage, key) for stage, key in self.index() if is_name(f"{stage}/{key}")]
+        matches = [(s, k) for s, k in pairs if f"{s}/{k}".startswith(text) or k.startswith(text)]
         if len(matches) > 1:
             names = ", ".join(f"{stage}/{key[:SHORT]}" for stage, key in matches[:CANDIDATES])
             more = f" and {len(matches) - CANDIDATES} more" if len(matches) > CANDIDATES else ""

@@ -29,9 +29,9 @@ def lookup3(data: bytes) -> bytes:
         state = [(s + w) % 2**32 for s, w in zip(state, words[i : i + 3], strict=True)]
         if i + 3 < len(words):
             for n, bits in enumerate(ROUND):
-                word, last, other = n % 3, (n + 2) % 3, (n + 1) % 3
+                word, last, before = n % 3, (n + 2) % 3, (n + 1) % 3
                 state[word] = (state[word] - state[last]) % 2**32 ^ _turned(state[last], bits)
-                state[last] = (state[last] + state[other]) % 2**32
+                state[last] = (state[last] + state[before]) % 2**32
         else:
             for word, by, bits in LAST:
                 state[word] = ((state[word] ^ state[by]) - _turned(state[by], bits)) % 2**32

@@ -52,7 +52,7 @@ class Recorded:
 
 
 @dataclass
-class Survey:
+class Stock:
     """Every file of a store by what it is, as its name says."""
 
     objects: dict[str, File] = field(default_factory=dict)
@@ -68,46 +68,46 @@ class Survey:
 
     def named_by(self) -> dict[str, list[Recorded]]:
         """digest -> the readable records that name this object."""
-        found: dict[str, list[Recorded]] = {}
-        for one in self.records.values():
-            if one.record is not None:
-                found.setdefault(one.record.object, []).append(one)
-        return found
+        users: dict[str, list[Recorded]] = {}
+        for recorded in self.records.values():
+            if recorded.record is not None:
+                users.setdefault(recorded.record.object, []).append(recorded)
+        return users
 
     def newest(self) -> float:
         """The latest time of any object or record, 0 in an empty store."""
-        files = [*self.objects.values(), *(one.file for one in self.records.values())]
+        files = [*self.objects.values(), *(recorded.file for recorded in self.records.values())]
         return max((file.mtime for file in files), default=0.0)
 
 
-def survey(root: Path, progress: Progress = silent) -> Survey:
+def survey(root: Path, progress: Progress = silent) -> Stock:
     """Everything in the store at ``root``. Objects come before records: what is committed meanwhile is not missed."""
-    found = Survey()
+    stock = Stock()
     with reading_errors(root):
         for entry in _entries(root, top=True):
             if entry.name not in BESIDE and not (entry.name in FOLDERS and entry.is_dir(follow_symlinks=False)):
-                _add(found.foreign, entry)
-        _objects(root, found)
-        found.records = records(root, found.foreign, progress)
+                _add(stock.foreign, entry)
+        _objects(root, stock)
+        stock.records = records(root, stock.foreign, progress)
         for entry in _entries(root / "partial"):
             inner = list(_entries(Path(entry.path))) if re.fullmatch(DIGEST, entry.name) else [entry]
-            for one in inner:
-                fits = one is not entry and CHUNK.fullmatch(one.name)
-                _add(found.chunks.setdefault(entry.name, []) if fits else found.foreign, one)
-        found.pins = pinned(root, found.foreign)
+            for file in inner:
+                fits = file is not entry and CHUNK.fullmatch(file.name)
+                _add(stock.chunks.setdefault(entry.name, []) if fits else stock.foreign, file)
+        stock.pins = pinned(root, stock.foreign)
         for name, files, pattern in (
-            ("locks", found.locks, rf"{DIGEST}\.lock"),
-            ("tmp", found.temporary, WRITER),
-            ("quarantine", found.quarantine, ".*"),
+            ("locks", stock.locks, rf"{DIGEST}\.lock"),
+            ("tmp", stock.temporary, WRITER),
+            ("quarantine", stock.quarantine, ".*"),
         ):
             for entry in _entries(root / name):
-                _add(files if re.fullmatch(pattern, entry.name, re.S) else found.foreign, entry)
-    return found
+                _add(files if re.fullmatch(pattern, entry.name, re.S) else stock.foreign, entry)
+    return stock
 
 
 def records(root: Path, foreign: list[File] | None = None, progress: Progress = silent) -> dict[str, Recorded]:
     """full name -> the file of a record; what is none goes to ``foreign``."""
-    found: dict[str, Recorded] = {}
+    by_name: dict[str, Recorded] = {}
     strange: list[File] = [] if foreign is None else foreign
     stages = list(_entries(root / "records"))
     for i, stage in enumerate(stages):
@@ -120,9 +120,9 @@ def records(root: Path, foreign: list[File] | None = None, progress: Progress = 
             match = RECORD.fullmatch(entry.name)
             if not match or entry.is_dir():
                 _add(strange, entry)
-            elif (one := look(Path(entry.path), stage.name, match[1])) is not None:
-                found[one.full] = one
-    return found
+            elif (recorded := look(Path(entry.path), stage.name, match[1])) is not None:
+                by_name[recorded.full] = recorded
+    return by_name
 
 
 def object_path(root: Path, digest: str) -> Path:
@@ -150,13 +150,13 @@ def look(path: Path, stage: str, key: str) -> Recorded | None:
 
 def pinned(root: Path, foreign: list[File] | None = None) -> dict[str, list[str] | None]:
     """label -> the full names that a pin keeps, None for a pin that does not read."""
-    found: dict[str, list[str] | None] = {}
+    pins: dict[str, list[str] | None] = {}
     for entry in _entries(root / "refs"):
         if not entry.name.endswith(".json"):
             _add([] if foreign is None else foreign, entry)
             continue
-        found[entry.name.removesuffix(".json")] = _pin(Path(entry.path))
-    return found
+        pins[entry.name.removesuffix(".json")] = _pin(Path(entry.path))
+    return pins
 
 
 def _pin(path: Path) -> list[str] | None:
@@ -167,21 +167,21 @@ def _pin(path: Path) -> list[str] | None:
         return None
 
 
-def _objects(root: Path, found: Survey) -> None:
+def _objects(root: Path, stock: Stock) -> None:
     for folder in _entries(root / "objects"):
         if not folder.is_dir(follow_symlinks=False):
-            _add(found.foreign, folder)
+            _add(stock.foreign, folder)
             continue
         for entry in _entries(Path(folder.path)):
             match, leaving = OBJECT.fullmatch(entry.name), REMOVING.fullmatch(entry.name)
             files: list[File] = []
             if entry.is_dir() or not entry.name.startswith(folder.name) or not (match or leaving):
-                _add(found.foreign, entry)
+                _add(stock.foreign, entry)
             elif _add(files, entry):
                 if match:
-                    found.objects[match[1]] = files[0]
+                    stock.objects[match[1]] = files[0]
                 elif leaving:
-                    found.removing.append((leaving[1], files[0]))
+                    stock.removing.append((leaving[1], files[0]))
 
 
 def _add(files: list[File], entry: os.DirEntry[str]) -> bool:
@@ -198,7 +198,7 @@ def _entries(folder: Path, top: bool = False) -> Iterator[os.DirEntry[str]]:
     """What is in ``folder``, by name; nothing where there is no such folder, or a link in its place."""
     try:
         with os.scandir(folder) as entries:
-            found = sorted(entries, key=lambda entry: entry.name)
+            ordered = sorted(entries, key=lambda entry: entry.name)
     except (FileNotFoundError, NotADirectoryError):
         return
-    yield from (entry for entry in found if top or not folder.is_symlink())
+    yield from (entry for entry in ordered if top or not folder.is_symlink())

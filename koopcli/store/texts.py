@@ -35,14 +35,14 @@ class Texts:
 
     def of(self, address: int) -> dict[str, str]:
         """The texts of the object whose header is at ``address``, by name."""
-        found = {}
+        texts = {}
         for message in self._attributes(address):
             version, flags, name, kind, space = struct.unpack_from("<BBHHH", message)
             start = 9 + name + kind + space  # of the value: length, heap, number in the heap
             text = message[9 + name : 11 + name]
             if version == 3 and not flags and len(message) == start + 16 and (text[0] & 15, text[1] & 15) == (9, 1):
-                found[message[9 : 8 + name].decode()] = self._text(*struct.unpack_from("<IQI", message, start))
-        return found
+                texts[message[9 : 8 + name].decode()] = self._text(*struct.unpack_from("<IQI", message, start))
+        return texts
 
     def _attributes(self, address: int) -> Iterator[bytes]:
         """The attribute messages of an object header and of all that continues it."""

@@ -14,7 +14,7 @@ from koopcli.store.files import HOUR, UntrustedFileError, open_regular, size_tex
 from koopcli.store.names import short_name
 from koopcli.store.records import Record
 from koopcli.store.store import Store
-from koopcli.store.survey import Recorded, Survey, object_path, survey
+from koopcli.store.survey import Recorded, Stock, object_path, survey
 
 DAMAGE = (
     "damaged record",
@@ -67,40 +67,40 @@ Opens = Callable[[Record, Packed], tuple[str, str] | None]
 
 def verify(store: Store, opens: Opens | None, progress: Progress = silent) -> Report:
     """Check every record, and every object against it; with ``opens`` every byte of the objects too."""
-    there = survey(store.root)
-    objects = _Objects(store, there, opens, progress)
-    findings = [*_records(store, there), *objects.check(), *_pins(store, there), *_beside(store, there)]
-    return Report(len(there.records), objects.read, len(there.chunks), len(there.quarantine), tuple(findings))
+    stock = survey(store.root)
+    objects = _Objects(store, stock, opens, progress)
+    findings = [*_records(store, stock), *objects.check(), *_pins(store, stock), *_beside(store, stock)]
+    return Report(len(stock.records), objects.read, len(stock.chunks), len(stock.quarantine), tuple(findings))
 
 
-def _records(store: Store, there: Survey) -> Iterator[Finding]:
-    for full, one in there.records.items():
-        path = _relative(store, one.file.path)
-        if one.record is None and one.damaged:
+def _records(store: Store, stock: Stock) -> Iterator[Finding]:
+    for full, recorded in stock.records.items():
+        path = _relative(store, recorded.file.path)
+        if recorded.record is None and recorded.damaged:
             yield Finding("damaged record", path, "does not match its own check or its name", full)
-        elif one.record is None:
+        elif recorded.record is None:
             yield Finding("newer format", path, "written by a newer koop; left alone: update koop", full)
         else:
-            for role, name in one.record.lineage.items():
-                if name not in there.records:
+            for role, name in recorded.record.lineage.items():
+                if name not in stock.records:
                     yield Finding("input gone", path, f"its {role}, {short_name(name)}, is no longer here", full)
 
 
 @dataclass
 class _Objects:
     store: Store
-    there: Survey
+    stock: Stock
     opens: Opens | None
     progress: Progress
     read: int = 0
 
     def check(self) -> Iterator[Finding]:
         """Findings about the objects, missing ones included."""
-        users = self.there.named_by()
-        total = max(1, sum(file.size for file in self.there.objects.values()))
+        users = self.stock.named_by()
+        total = max(1, sum(file.size for file in self.stock.objects.values()))
         done = 0
-        for digest in sorted(users.keys() | self.there.objects):
-            file = self.there.objects.get(digest)
+        for digest in sorted(users.keys() | self.stock.objects):
+            file = self.stock.objects.get(digest)
             yield from self._check(digest, users.get(digest, []))
             done += file.size if file else 0
             self.progress(done, total)
@@ -108,14 +108,14 @@ class _Objects:
     def _check(self, digest: str, users: list[Recorded]) -> Iterator[Finding]:
         path = object_path(self.store.root, digest)
         shown = _relative(self.store, path)
-        for one in users:
-            found = self._problem(lambda one=one: self._used(one), one.file.path.exists)  # type: ignore[misc]
-            if found is not None:
-                yield Finding(found[0], shown, found[1], one.full)
+        for user in users:
+            problem = self._problem(lambda user=user: self._used(user), user.file.path.exists)  # type: ignore[misc]
+            if problem is not None:
+                yield Finding(problem[0], shown, problem[1], user.full)
         if not users:
-            found = self._problem(lambda: self._unused(path, digest), lambda: False)
-            if found is not None:
-                yield Finding(found[0], shown, found[1])
+            problem = self._problem(lambda: self._unused(path, digest), lambda: False)
+            if problem is not None:
+                yield Finding(problem[0], shown, problem[1])
 
     def _problem(
         self, look: Callable[[], tuple[str, str] | None], expected: Callable[[], bool]
@@ -132,15 +132,15 @@ class _Objects:
         except OSError as error:
             return "damaged object", f"cannot be read: {error.strerror or error}"
 
-    def _used(self, one: Recorded) -> tuple[str, str] | None:
-        assert one.record is not None, "it names an object"
+    def _used(self, recorded: Recorded) -> tuple[str, str] | None:
+        assert recorded.record is not None, "it names an object"
         if self.opens is None:
-            with open_regular(self.store.path(one.record)) as (_, size):
-                if size != one.record.size:
-                    return "damaged object", f"has {size:,} bytes, not {one.record.size:,}"
+            with open_regular(self.store.path(recorded.record)) as (_, size):
+                if size != recorded.record.size:
+                    return "damaged object", f"has {size:,} bytes, not {recorded.record.size:,}"
             return None
-        self.read += one.record.size
-        return self.opens(one.record, self.store.inspect(one.record))
+        self.read += recorded.record.size
+        return self.opens(recorded.record, self.store.inspect(recorded.record))
 
     def _unused(self, path: Path, digest: str) -> tuple[str, str]:
         with open_regular(path) as (file, size):
@@ -151,32 +151,32 @@ class _Objects:
         return "orphan object", f"{size_text(size)} that no record names: see koop gc"
 
 
-def _pins(store: Store, there: Survey) -> Iterator[Finding]:
-    for label, names in there.pins.items():
+def _pins(store: Store, stock: Stock) -> Iterator[Finding]:
+    for label, names in stock.pins.items():
         path = f"refs/{label}.json"
         if names is None:
             yield Finding("damaged pin", path, f"does not say what it keeps: koop unpin {label}, and pin again")
         for name in names or []:
-            if name not in there.records:
+            if name not in stock.records:
                 what = f"keeps {short_name(name)}, which is gone: make it again, or koop unpin {label}"
                 yield Finding("pin of nothing", path, what, name)
 
 
-def _beside(store: Store, there: Survey) -> Iterator[Finding]:
+def _beside(store: Store, stock: Stock) -> Iterator[Finding]:
     """What is no artefact: litter, chunks of what is finished, and what nobody here has written."""
-    users = there.named_by()
-    finished = {one.key: one.full for digest in users.keys() & there.objects.keys() for one in users[digest]}
-    for key, files in there.chunks.items():
+    users = stock.named_by()
+    finished = {user.key: user.full for digest in users.keys() & stock.objects.keys() for user in users[digest]}
+    for key, files in stock.chunks.items():
         if key in finished:
             what = f"{len(files)} chunks of a finished artefact: the next command clears them"
             yield Finding("orphan chunks", f"partial/{key}", what, finished[key])
-    for _, file in there.removing:
+    for _, file in stock.removing:
         yield Finding("half-removed object", _relative(store, file.path), "a `koop gc` was cut off here: run it again")
-    now = max(time.time(), there.newest())  # only to tell a file at work from litter
-    for file in there.temporary:
+    now = max(time.time(), stock.newest())  # only to tell a file at work from litter
+    for file in stock.temporary:
         if now - file.mtime > HOUR:
             yield Finding("temporary file", _relative(store, file.path), "left by a process that was cut off")
-    for file in there.foreign:
+    for file in stock.foreign:
         yield Finding("foreign file", _relative(store, file.path), "not written by koop; left alone")
 
 

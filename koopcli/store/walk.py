@@ -99,7 +99,7 @@ class _Walk:
         if layout == h5d.VIRTUAL or plist.get_external_count():
             refuse(f"the values of '{path}' are in another file")
         kind, space = dataset.get_type(), dataset.get_space()
-        if kind.committed() or not any(kind.equal(known) for known in TYPES):
+        if kind.committed() or not any(kind.equal(stored_type) for stored_type in TYPES):
             refuse(f"'{path}' is not of plain numbers")
         if space.get_simple_extent_type() != h5s.SIMPLE:
             refuse(f"'{path}' has no axes")
@@ -159,19 +159,19 @@ def _check_chunks(dataset: h5d.DatasetID, plist: Any, shape: tuple[int, ...], pa
     if length > CHUNK or len(set(filters)) < len(filters) or any((code, how) not in usual for code, _, how, _ in steps):
         refuse(f"'{path}' is packed by other than gzip and shuffle, or in chunks over {CHUNK} bytes")
     grid = math.prod(-(-n // step) for n, step in zip(shape, chunk, strict=True))
-    found: list[Any] = []
+    chunks: list[Any] = []
 
-    def collect(one: Any) -> bool | None:
-        found.append(one)
-        return len(found) > min(grid, CHUNKS) or None
+    def collect(piece: Any) -> bool | None:
+        chunks.append(piece)
+        return len(chunks) > min(grid, CHUNKS) or None
 
     dataset.chunk_iter(collect)
-    if len(found) > min(grid, CHUNKS) or len({one.chunk_offset for one in found}) < len(found):
+    if len(chunks) > min(grid, CHUNKS) or len({piece.chunk_offset for piece in chunks}) < len(chunks):
         refuse(f"'{path}' has more chunks than it can hold")
-    for one in found:
-        if one.size > 2 * length + 1024:
+    for piece in chunks:
+        if piece.size > 2 * length + 1024:
             refuse(f"a chunk of '{path}' claims bytes that it cannot have")
-        skipped, stored = dataset.read_direct_chunk(one.chunk_offset)
+        skipped, stored = dataset.read_direct_chunk(piece.chunk_offset)
         deflated = any(code == h5z.FILTER_DEFLATE and not skipped >> i & 1 for i, code in enumerate(filters))
         if (_inflated(stored, length) if deflated else len(stored)) != length:
             refuse(f"a chunk of '{path}' does not unpack to its size")

@@ -51,10 +51,10 @@ class VehicleParameters:
             if getattr(self, rear) is not None and getattr(self, front) is None:
                 raise InvalidValueError(f"'{rear}' stands beside '{front}', which is missing: give that of the front")
         for name in ("longitudinal", "longitudinal_rear"):
-            there: MagicFormula | None = getattr(self, name)
-            if there is not None and there.S_h != 0:
+            tyre: MagicFormula | None = getattr(self, name)
+            if tyre is not None and tyre.S_h != 0:
                 raise InvalidValueError(
-                    f"'{name}.S_h' must be 0, got {there.S_h:g}: a shift along the wheel would push a standing car"
+                    f"'{name}.S_h' must be 0, got {tyre.S_h:g}: a shift along the wheel would push a standing car"
                 )
 
 
@@ -91,10 +91,10 @@ def read_vehicle_file(path: Path) -> VehicleFile:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InvalidValueError(here.say(f"cannot read the vehicle file: {reason}")) from error
-    known = ("title", "source", "parameters", *TYRES)
+    keys = ("title", "source", "parameters", *TYRES)
     for key in content:
-        if key not in known:
-            raise InvalidValueError(here.say(f"unknown key '{key}' (known: {', '.join(known)})"))
+        if key not in keys:
+            raise InvalidValueError(here.say(f"unknown key '{key}' (known: {', '.join(keys)})"))
     if "parameters" not in content:
         raise InvalidValueError(here.say("missing table '[parameters]'"))
     values = _table(content["parameters"], "parameters", IN_PARAMETERS, here)
@@ -123,9 +123,9 @@ def change(vehicle: VehicleParameters, changes: Mapping[str, object], origin: Or
     """
     merged: dict[str, object] = dict(vars(vehicle))
     for key, value in changes.items():
-        there: Any = merged.get(key)
-        nested = is_dataclass(there) and isinstance(value, Mapping)
-        merged[key] = {**vars(there), **value} if nested else value  # type: ignore[dict-item]
+        current: Any = merged.get(key)
+        nested = is_dataclass(current) and isinstance(value, Mapping)
+        merged[key] = {**vars(current), **value} if nested else value  # type: ignore[dict-item]
     return build(VehicleParameters, merged, origin, "vehicle.")
 
 

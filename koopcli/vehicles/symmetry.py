@@ -43,7 +43,7 @@ def images(names: tuple[Mirror, ...], p: VehicleParameters, states: Sequence[str
 
     Raises ``InvalidValueError`` for a vehicle without one of the symmetries.
     """
-    found = [np.ones(len(states))]
+    images = [np.ones(len(states))]
     for name in names:
-        found += [one * signs(name, p, states) for one in found]
-    return found[1:]
+        images += [image * signs(name, p, states) for image in images]
+    return images[1:]

@@ -30,7 +30,7 @@ from koopcli.simulation.samples.grid import GridSample
 from koopcli.simulation.samples.manoeuvre import ManoeuvreSample
 from koopcli.simulation.samples.sample import INPUTS, Excitation
 from koopcli.simulation.sampling import DRAWS, MESHES
-from koopcli.stages.makers import LIFTED
+from koopcli.stages.fits import LIFTED
 from koopcli.vehicles.plants import PLANTS
 from koopcli.vehicles.plants.forces import WHEELS_PER_FORCE, Forces
 from koopcli.vehicles.plants.slips import Slips

@@ -25,7 +25,7 @@ from koopcli.figures.kit import style
 from koopcli.figures.kit.figure import TAKES, Drawing, drawing, sources_of
 from koopcli.figures.kit.registry import FIGURES
 from koopcli.figures.kit.style import COLOURS
-from koopcli.stages.makers import LIFTED, MAKERS
+from koopcli.stages.fits import FITS, LIFTED
 from koopcli.stages.naming import AXES
 from koopcli.stages.registry import STAGES
 from tests.stages.toys import figure_records, figure_settings
@@ -84,7 +84,7 @@ def test_figures_are_listed_without_matplotlib():
 
 
 def test_what_a_figure_takes_is_what_stages_make():
-    assert (TAKES["predictor"], TAKES["fit"]) == (tuple(MAKERS), LIFTED)
+    assert (TAKES["predictor"], TAKES["fit"]) == (tuple(FITS), LIFTED)
 
 
 @pytest.mark.parametrize(

@@ -64,9 +64,9 @@ def apart(wanted: FloatArray, heights: FloatArray) -> FloatArray:
             before, many = blocks[-1]
             blocks[-1] = [(before * many + mean * count) / (many + count), many + count]
     lifted = np.concatenate([np.full(int(count), mean) for mean, count in blocks])
-    found = np.empty(len(wanted))
-    found[order] = np.clip(lifted, 0, max(0.0, 1 - float(heights.sum()))) + below
-    return found
+    places = np.empty(len(wanted))
+    places[order] = np.clip(lifted, 0, max(0.0, 1 - float(heights.sum()))) + below
+    return places
 
 
 def _wrapped(name: str) -> str:

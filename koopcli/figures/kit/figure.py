@@ -92,7 +92,7 @@ def sources_of(settings: Plot, inputs: Mapping[str, Any]) -> list[Source]:
         number, _, role = name.partition("/")
         records.setdefault(int(number), {})[role] = record
     series = settings.series or (Series(""),) * len(records)
-    return [Source(one.label, one.at, records[i]) for i, one in enumerate(series)]
+    return [Source(entry.label, entry.at, records[i]) for i, entry in enumerate(series)]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -154,8 +154,8 @@ def with_error(sources: Sequence[Source]) -> list[BoolArray]:
     Raises ``InvalidValueError`` where none of any evaluation has.
     """
     evaluations = [source.records["evaluation"] for source in sources]
-    shown = [np.asarray(np.isfinite(one.rmse) & ~one.diverged) for one in evaluations]
-    if not any(one.any() for one in shown):
+    shown = [np.asarray(np.isfinite(evaluation.rmse) & ~evaluation.diverged) for evaluation in evaluations]
+    if not any(mask.any() for mask in shown):
         whose = "this evaluation" if len(sources) == 1 else "these evaluations"
         raise InvalidValueError(f"every prediction of {whose} diverged: there is no error to draw")
     return shown

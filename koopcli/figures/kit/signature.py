@@ -18,7 +18,7 @@ def signature(of: Subject, version: str) -> str:
     Names of vehicles are looked up when it is drawn. Neither they nor the version are in the key of a stored figure,
     which keeps the line that it was drawn with.
     """
-    vehicles = [called(one) for one in of.vehicles]
+    vehicles = [called(vehicle) for vehicle in of.vehicles]
     long, short = (
         BETWEEN.join(
             part

@@ -88,9 +88,9 @@ def plain(text: str) -> str:
 
 def legend_below(figure: Figure, title: str | None = None, columns: int = 2, **look: float) -> None:
     """The legend under the panels, in as many ``columns`` as its words leave room for, and room for its rows."""
-    found = [axes.get_legend_handles_labels() for axes in figure.axes]
-    handles = [handle for some, _ in found for handle in some]
-    labels = [fill(label, WIDEST) for _, names in found for label in names]
+    legends = [axes.get_legend_handles_labels() for axes in figure.axes]
+    handles = [handle for some, _ in legends for handle in some]
+    labels = [fill(label, WIDEST) for _, names in legends for label in names]
     longest = max(len(line) for label in labels for line in label.splitlines())
     if columns * (longest + HANDLE) > WIDEST + HANDLE:
         columns = 1

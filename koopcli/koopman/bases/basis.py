@@ -6,11 +6,11 @@ from typing import Any, ClassVar, Protocol
 
 from koopcli.checks import Choice
 from koopcli.koopman.bases.moments import Products
-from koopcli.koopman.predictor.lifts import Lift
+from koopcli.koopman.predictor.lifts import Observables
 from koopcli.records import FloatArray
 
 
-class Basis(Lift, Protocol):
+class Basis(Observables, Protocol):
     """A lift by explicit functions of the state, which EDMD can fit."""
 
     @property

@@ -41,12 +41,12 @@ class Products:
     def gram(self, sums: FloatArray) -> FloatArray:
         """Σ_n weights[q, n] ψ(x_n) ψ(x_n)ᵀ as (q, N, N), from such ``sums``."""
         q, n_x = len(sums), len(self.linear)
-        found = sums.reshape(q, *(c.shape[2] for c in self.linear))
+        gram = sums.reshape(q, *(c.shape[2] for c in self.linear))
         for c in self.linear:  # contracts one state's moments after another; (a, d) of each goes to the end
-            found = np.tensordot(found, c, axes=(1, 2))
+            gram = np.tensordot(gram, c, axes=(1, 2))
         order = [0, *range(1, 2 * n_x, 2), *range(2, 2 * n_x + 1, 2)]
         N = int(np.prod([len(c) for c in self.linear]))
-        return np.asarray(found.transpose(order)).reshape(q, N, N)
+        return np.asarray(gram.transpose(order)).reshape(q, N, N)
 
 
 def products_of(axes: Sequence[OrthonormalPolynomials]) -> Products:

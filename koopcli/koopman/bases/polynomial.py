@@ -153,10 +153,10 @@ class Polynomial(Content):
         return cls(tuple(axes), degrees)
 
 
-def _heads(leading: Sequence[FloatArray], degrees: IndexArray, one: FloatArray) -> FloatArray:
+def _heads(leading: Sequence[FloatArray], degrees: IndexArray, ones: FloatArray) -> FloatArray:
     """Products (rows, …) of the factors (degree + 1, …) of all states but the last, for each row of ``degrees``."""
     if not leading:
-        return one[np.newaxis]
+        return ones[np.newaxis]
     head = leading[0][degrees[:, 0]]
     for i, factor in enumerate(leading[1:], 1):
         head *= factor[degrees[:, i]]

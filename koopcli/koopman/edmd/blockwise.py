@@ -36,8 +36,8 @@ def fit_blocks(seen: Survey, basis: Basis, bilinear: bool, ridge: float, plain: 
     elif c is not None:
         free += [functions * (q + 1) + c for q in range(r)]
     solution = cholesky(together(over(Sum(columns)))) if plain else _least_squares(columns, seen, ridge, free, over)
-    found = solution.coefficients.T
-    A, rest = found[:, :functions], found[:, functions:]
+    coefficients = solution.coefficients.T
+    A, rest = coefficients[:, :functions], coefficients[:, functions:]
     B = rest[:, :r] if layout.inputs or not bilinear else None
     N = rest[:, layout.inputs :].reshape(functions, r, functions).transpose(1, 0, 2) if bilinear else None
     missing = int(inputs.moving.sum()) - r
@@ -75,6 +75,6 @@ def _moments_hold(basis: Basis, seen: Survey) -> bool:
     x = seen.states[spread(len(seen.states), TRIED * basis.functions)]
     z = basis.lift(x).T
     direct = z @ z.T
-    (found,) = basis.products.gram(basis.products.sums(x, np.ones((1, len(x)))))
+    (gram,) = basis.products.gram(basis.products.sums(x, np.ones((1, len(x)))))
     nothing = np.zeros((len(z), 0))
-    return Scaled.of(Normal(direct, nothing, len(x), lost_by(found, direct))).harmless
+    return Scaled.of(Normal(direct, nothing, len(x), lost_by(gram, direct))).harmless

@@ -101,18 +101,18 @@ def fit(
     seen = seen or survey(pairs, over)
     product = pairs.product
     if product is not None and basis.constant is not None and not how.plain:
-        found = fit_product(product, seen, basis, products, how.ridge, progress)
+        operators = fit_product(product, seen, basis, products, how.ridge, progress)
     else:
-        found = fit_blocks(seen, basis, products, how.ridge, how.plain, over)
+        operators = fit_blocks(seen, basis, products, how.ridge, how.plain, over)
     return Predictor(
         observables=basis,
-        dynamics=how.terms.dynamics(found, basis.constant, pairs.dt),
+        dynamics=how.terms.dynamics(operators, basis.constant, pairs.dt),
         C=basis.state_map,
         dt=pairs.dt,
         coverage=coverage_of(seen.states, seen.corners),
         state_channels=pairs.state_channels,
         input_channels=pairs.input_channels,
-        regression=Regression(found.rank, found.directions, found.condition, found.solved_by),
+        regression=Regression(operators.rank, operators.directions, operators.condition, operators.solved_by),
         plant=pairs.plant,
     )
 

@@ -21,7 +21,7 @@ def generator_of(A: FloatArray, B: FloatArray, N: FloatArray, constant: int, dt:
     from scipy.linalg import expm, logm  # noqa: PLC0415  (other fits go without)
 
     functions = len(A)
-    found: list[FloatArray] = []
+    blocks: list[FloatArray] = []
     for i, products in enumerate(N):
         slope = products.copy()
         slope[:, constant] += B[:, i]
@@ -36,7 +36,7 @@ def generator_of(A: FloatArray, B: FloatArray, N: FloatArray, constant: int, dt:
                 "the fitted step has no real generator, as one that turns or decays too far within a sample has not: "
                 "lower simulate.dt, or use --terms bilinear"
             )
-        if not found:
-            found.append(real[:functions, :functions] / dt)
-        found.append(real[:functions, functions:] * size / dt)
-    return np.stack(found)
+        if not blocks:
+            blocks.append(real[:functions, :functions] / dt)
+        blocks.append(real[:functions, functions:] * size / dt)
+    return np.stack(blocks)

@@ -52,8 +52,8 @@ def operators(
             terms[:, :, c] = 0.0
     if c is not None and B is not None:
         A[:, c] -= in_B @ inputs.mean
-    for found in (A, in_B, terms):
-        if found is not None and not np.isfinite(found).all():
+    for matrix in (A, in_B, terms):
+        if matrix is not None and not np.isfinite(matrix).all():
             raise InvalidValueError("the regression left the finite numbers: lower the order, or use a --ridge")
     condition = condition_number(np.concatenate([solution.singular_values, inputs.singular]))
     return Operators(A, in_B, terms, rank, directions, condition, solved_by)

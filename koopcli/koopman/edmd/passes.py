@@ -41,10 +41,10 @@ def here(data: Transitions, progress: Progress = silent) -> Over:
     return lambda work: [work(data, slice(0, len(data)), progress)]
 
 
-def pack_found(found: Found) -> Packed:
+def pack_found(results: Found) -> Packed:
     """What a part gave, for storage."""
     return Packed(
-        {name: Array(values, tuple(f"axis {i}" for i in range(values.ndim)), "1") for name, values in found.items()}
+        {name: Array(values, tuple(f"axis {i}" for i in range(values.ndim)), "1") for name, values in results.items()}
     )
 
 

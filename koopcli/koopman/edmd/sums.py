@@ -133,8 +133,8 @@ class Sum:
                 gram.add(block)
                 cross += np.matmul(block.V, block.Y.T, out=product)
                 rows += len(block.x)
-            found, lost = gram.total()
-        return {"gram": found, "cross": cross, "rows": np.array([rows]), "lost": np.array([lost])}
+            total, lost = gram.total()
+        return {"gram": total, "cross": cross, "rows": np.array([rows]), "lost": np.array([lost])}
 
     def pack(self) -> Packed:
         """The regressors, and the way."""
@@ -264,14 +264,14 @@ class _Gram:
     def _whole(self, sums: FloatArray, mixed: FloatArray) -> FloatArray:
         """V Vᵀ from the weighted sums of moments, and the rows of the inputs that stand apart."""
         N, columns = self.layout.functions, self.layout.columns
-        found = np.empty((columns, columns))
+        gram = np.empty((columns, columns))
         for (p, q), block in zip(_pairs(self.layout), self.products.gram(sums), strict=True):
             even = (block + block.T) / 2  # what rounding makes of a symmetric matrix
-            found[p * N : (p + 1) * N, q * N : (q + 1) * N] = even
-            found[q * N : (q + 1) * N, p * N : (p + 1) * N] = even
+            gram[p * N : (p + 1) * N, q * N : (q + 1) * N] = even
+            gram[q * N : (q + 1) * N, p * N : (p + 1) * N] = even
         if len(mixed):
-            found[N:], found[:, N:] = mixed, mixed.T
-        return found
+            gram[N:], gram[:, N:] = mixed, mixed.T
+        return gram
 
 
 def _pairs(layout: Layout) -> list[tuple[int, int]]:

@@ -75,15 +75,15 @@ def survey(data: Transitions, over: Over) -> Survey:
         columns, states = product_factors(product)
         triangle = add_inputs(np.empty((0, 1 + columns.shape[1])), columns)
         return Survey(states, corners_of(states), triangle, _ends(columns), columns)
-    found = list(over(Look()))
-    corners = found[0]["corners"]
-    for part in found[1:]:
+    parts = list(over(Look()))
+    corners = parts[0]["corners"]
+    for part in parts[1:]:
         corners = corners_of(np.concatenate([corners, part["corners"]]))
-    triangle = found[0]["triangle"]
-    for part in found[1:]:
+    triangle = parts[0]["triangle"]
+    for part in parts[1:]:
         triangle = add_rows(triangle, part["triangle"])
-    ends = _ends(*(part["ends"] for part in found))
-    return Survey(np.concatenate([part["states"] for part in found]), corners, triangle, ends)
+    ends = _ends(*(part["ends"] for part in parts))
+    return Survey(np.concatenate([part["states"] for part in parts]), corners, triangle, ends)
 
 
 def add_inputs(triangle: FloatArray, u: FloatArray) -> FloatArray:

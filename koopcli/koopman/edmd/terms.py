@@ -28,7 +28,7 @@ class Terms(Choice):
         """Coefficients of each of so many lifted states."""
         return functions * (1 + inputs) if self.products else functions + inputs
 
-    def dynamics(self, found: Operators, constant: int | None, dt: float) -> Dynamics:
+    def dynamics(self, operators: Operators, constant: int | None, dt: float) -> Dynamics:
         """The dynamics with the fitted operators; ``constant``: which observable is one everywhere; ``dt`` in s."""
         raise NotImplementedError
 
@@ -40,9 +40,9 @@ class LinearTerms(Terms):
     kind: ClassVar[str] = "linear"
     rolled = 0
 
-    def dynamics(self, found: Operators, constant: int | None, dt: float) -> Dynamics:
+    def dynamics(self, operators: Operators, constant: int | None, dt: float) -> Dynamics:
         """z⁺ = A z + B u."""
-        return Linear(found.A, found.B)
+        return Linear(operators.A, operators.B)
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,10 @@ class BilinearTerms(Terms):
     rolled = 1
     label = "bilinear {}"
 
-    def dynamics(self, found: Operators, constant: int | None, dt: float) -> Dynamics:
+    def dynamics(self, operators: Operators, constant: int | None, dt: float) -> Dynamics:
         """z⁺ = A z + B u + Σ u_i N_i z."""
-        assert found.N is not None, "fitted with products"
-        return Bilinear(found.A, found.B, found.N)
+        assert operators.N is not None, "fitted with products"
+        return Bilinear(operators.A, operators.B, operators.N)
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ class GeneratorTerms(Terms):
     rolled = 10
     label = "bilinear {}, generator"
 
-    def dynamics(self, found: Operators, constant: int | None, dt: float) -> Dynamics:
+    def dynamics(self, operators: Operators, constant: int | None, dt: float) -> Dynamics:
         """ż = (K_0 + Σ u_i K_i) z."""
-        assert found.N is not None, "fitted with products"
+        assert operators.N is not None, "fitted with products"
         assert constant is not None, "a basis without a constant is refused by whoever chooses it"
-        return Generator(generator_of(found.A, found.B, found.N, constant, dt), dt)
+        return Generator(generator_of(operators.A, operators.B, operators.N, constant, dt), dt)

@@ -19,9 +19,9 @@ class Transitions:
 
     def __post_init__(self) -> None:
         first = self.records[0]
-        for other in self.records[1:]:
+        for record in self.records[1:]:
             for name in ("state_channels", "input_channels", "dt", "plant"):
-                if getattr(other, name) != getattr(first, name):
+                if getattr(record, name) != getattr(first, name):
                     raise InvalidValueError(f"these trajectories differ in their {_WORDS[name]}: fit them apart")
 
     @classmethod

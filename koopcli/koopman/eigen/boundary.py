@@ -17,7 +17,7 @@ CUT = "smallest singular value kept, relative to the largest, on which the error
 
 
 @dataclass(frozen=True)
-class Solution:
+class BoundaryFit:
     """Lifted initial states ``starts`` (J, copies, L or 1) and ``C`` (n_x, copies · L), with the regression's numbers.
 
     ``rank`` of ``directions`` were kept; ``condition`` is the largest over the smallest singular value before the cut;
@@ -64,7 +64,7 @@ def _coordinates(basis: FloatArray, values: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.lstsq(basis / size, values, rcond=None)[0] / size[:, np.newaxis])
 
 
-def fit_given(x: FloatArray, g: FloatArray, modes: Modes, cut: float) -> Solution:
+def fit_given(x: FloatArray, g: FloatArray, modes: Modes, cut: float) -> BoundaryFit:
     """C by least squares of ``x`` (J, samples, n_x) on g(x_0) ⊗ e^{λt}, for ``g`` (J, functions), eq. (7.7).
 
     The singular values of the regressors are the products of those of their two factors, columns scaled to length
@@ -78,7 +78,7 @@ def fit_given(x: FloatArray, g: FloatArray, modes: Modes, cut: float) -> Solutio
     keep = both > cut * both.max()
     seen = np.tensordot(np.tensordot(left.T, x, axes=1), time.left, axes=(1, 0))  # (copies, n_x, L)
     C = np.where(keep, seen.transpose(1, 0, 2), 0.0) @ time.driven.T
-    return Solution(
+    return BoundaryFit(
         starts=left[:, :, np.newaxis],
         C=C.reshape(x.shape[2], -1),
         rank=int(keep.sum()),
@@ -88,7 +88,7 @@ def fit_given(x: FloatArray, g: FloatArray, modes: Modes, cut: float) -> Solutio
     )
 
 
-def fit_free(x: FloatArray, modes: Modes, cut: float) -> Solution:
+def fit_free(x: FloatArray, modes: Modes, cut: float) -> BoundaryFit:
     """The best boundary values for every state, rate and trajectory of ``x`` (J, samples, n_x), eq. (7.8).
 
     One small least squares for each trajectory, all with the same regressors; ``C`` then only reads off the last state
@@ -98,7 +98,7 @@ def fit_free(x: FloatArray, modes: Modes, cut: float) -> Solution:
     keep = time.kept(cut)
     held = np.tensordot(x, time.left[:, keep], axes=(1, 0))  # (J, n_x, kept)
     n_x, L = x.shape[2], len(modes.rates)
-    return Solution(
+    return BoundaryFit(
         starts=held @ time.seen[:, keep].T,  # (J, n_x, L)
         C=read_off(n_x, L),
         rank=int(keep.sum()),
@@ -163,13 +163,13 @@ class Boundary(Choice):
         """Boundary functions of so many ``states`` on so many ``starts``."""
         return states
 
-    def solve(self, x: FloatArray, modes: Modes) -> Solution:
+    def solve(self, x: FloatArray, modes: Modes) -> BoundaryFit:
         """The boundary values and C for trajectories ``x`` (J, samples, n_x); ``modes`` has one copy here."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
-class Splines(Boundary):
+class BoundarySplines(Boundary):
     """Thin-plate splines of the state, as in the paper."""
 
     kind: ClassVar[str] = "thin-plate"
@@ -182,7 +182,7 @@ class Splines(Boundary):
         """As many as there are splines, and not more than they can be told apart by."""
         return min(starts, self.centres)
 
-    def solve(self, x: FloatArray, modes: Modes) -> Solution:
+    def solve(self, x: FloatArray, modes: Modes) -> BoundaryFit:
         """C by least squares with splines of the initial states."""
         half = np.ptp(x, axis=(0, 1)) / 2
         scale = np.where(half > 0, half, 1.0) if self.scaling == "extent" else np.ones(x.shape[2])
@@ -197,7 +197,7 @@ class Optimal(Boundary):
     kind: ClassVar[str] = "optimal"
     cut: float | None = setting(None, low=0, high=0.5, option=True, help=CUT)
 
-    def solve(self, x: FloatArray, modes: Modes) -> Solution:
+    def solve(self, x: FloatArray, modes: Modes) -> BoundaryFit:
         """The best values, and C that reads states off."""
         return fit_free(x, modes, kept(self.cut, x.shape[1]))
 

@@ -151,5 +151,5 @@ def with_images(trajectories: Trajectories, signs: list[FloatArray]) -> Trajecto
     if np.asarray(trajectories.u[0]).any():
         raise InvalidValueError("mirror images are those of a car that rolls by itself: these trajectories have inputs")
     x, u = np.asarray(trajectories.x[:]), np.asarray(trajectories.u[:])
-    more = [x, *(x * one for one in signs)]
+    more = [x, *(x * sign for sign in signs)]
     return replace(trajectories, x=np.concatenate(more), u=np.concatenate([u] * len(more)), product=None)

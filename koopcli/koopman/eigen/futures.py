@@ -78,12 +78,12 @@ class Futures(Content):
 
     def _gathered(self, indices: IndexArray, weights: FloatArray) -> FloatArray:
         """The same where a table of all nodes would be too large: what follows those that are found."""
-        found = np.empty((len(indices), self.projection.shape[1] * self.trajectories.shape[2]))
+        gathered = np.empty((len(indices), self.projection.shape[1] * self.trajectories.shape[2]))
         for start in range(0, len(indices), GATHERED):
             rows = slice(start, start + GATHERED)
             values = self._values_of(indices[rows].ravel()).reshape(*indices[rows].shape, -1)
-            found[rows] = np.matmul(weights[rows, np.newaxis], values)[:, 0]
-        return found
+            gathered[rows] = np.matmul(weights[rows, np.newaxis], values)[:, 0]
+        return gathered
 
     @property
     def _table_bytes(self) -> float:

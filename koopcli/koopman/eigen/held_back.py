@@ -44,10 +44,10 @@ def held_back(
     of_group = fold[np.searchsorted(members, groups)]
     error = np.empty(len(x))
     folds = np.unique(fold)
-    for done, one in enumerate(folds):
+    for done, group in enumerate(folds):
         progress(done, len(folds))
-        rows = np.flatnonzero(of_group[j] == one)
-        rest = nodes.only(np.flatnonzero(of_group[nodes.trajectory] != one))
+        rows = np.flatnonzero(of_group[j] == group)
+        rest = nodes.only(np.flatnonzero(of_group[nodes.trajectory] != group))
         part = Futures(futures.trajectories, rest, futures.frame, futures.projection, futures.modes)
         try:
             error[rows] = rmse(predict(part, x[rows]), truth[rows])

@@ -65,13 +65,13 @@ def check_recurrence(x: FloatArray, dt: float, surface: Surface | None = None) -
             _stay_below(x, dt, surface)
             levels = count
             of[order[1:]] = np.cumsum(gaps)
-    for one in np.unique(of):
-        members = np.flatnonzero(of == one)
-        found = _passes_a_start(x[members])
-        if found is not None:
-            start = members[found.start]
+    for number in np.unique(of):
+        members = np.flatnonzero(of == number)
+        back = _passes_a_start(x[members])
+        if back is not None:
+            start = members[back.start]
             raise InvalidValueError(
-                f"trajectory {members[found.trajectory]} comes back at {found.sample * dt:g} s to the initial state of "
+                f"trajectory {members[back.trajectory]} comes back at {back.sample * dt:g} s to the initial state of "
                 f"trajectory {start}, {_text(x[start, 0])}: eigenfunctions need initial states that no trajectory "
                 "returns to; shorten the trajectories or choose other initial states"
             )

@@ -40,8 +40,8 @@ class Tabulated(Content):
         total = np.zeros((len(x), self.functions))
         for j, k, weight in self._found(x):
             driving = self._powers[k][:, :, : self.starts.shape[2]]
-            there = np.matmul(self.starts[j], driving.transpose(0, 2, 1)).reshape(len(x), self.functions)
-            total += weight[:, np.newaxis] * there
+            lifted = np.matmul(self.starts[j], driving.transpose(0, 2, 1)).reshape(len(x), self.functions)
+            total += weight[:, np.newaxis] * lifted
         return total
 
     def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
@@ -53,8 +53,8 @@ class Tabulated(Content):
         total = np.zeros((len(x), len(rows)))
         for j, k, weight in self._found(x):
             used, position = np.unique(j, return_inverse=True)
-            there = (self.starts[used, :, 0] @ by_copy).reshape(len(used), len(rows), L)
-            seen = np.matmul(there[position], self._powers[k][:, :, :1])[:, :, 0]
+            projected = (self.starts[used, :, 0] @ by_copy).reshape(len(used), len(rows), L)
+            seen = np.matmul(projected[position], self._powers[k][:, :, :1])[:, :, 0]
             total += weight[:, np.newaxis] * seen
         return total
 
@@ -66,8 +66,8 @@ class Tabulated(Content):
             carried = np.tensordot(by_copy, self._powers, axes=(2, 1))  # (R, copies, K, L)
             table = np.tensordot(self.starts, carried, axes=([1, 2], [1, 3])).transpose(0, 2, 1)
         else:
-            there = np.tensordot(self.starts[:, :, 0], by_copy, axes=(1, 1))  # (J, R, L)
-            table = np.tensordot(there, self._powers[:, :, 0], axes=(2, 1)).transpose(0, 2, 1)
+            projected = np.tensordot(self.starts[:, :, 0], by_copy, axes=(1, 1))  # (J, R, L)
+            table = np.tensordot(projected, self._powers[:, :, 0], axes=(2, 1)).transpose(0, 2, 1)
         assert table.shape == (J, K, len(rows))
 
         def look_up(x: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 from koopcli.checks import Choice, setting
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.eigen import boundary
-from koopcli.koopman.eigen.boundary import Boundary, Splines
+from koopcli.koopman.eigen.boundary import Boundary, BoundarySplines
 from koopcli.koopman.eigen.frames import check_frame
 from koopcli.koopman.eigen.futures import Futures
 from koopcli.koopman.eigen.held_back import held_back
@@ -72,7 +72,9 @@ class AlongTrajectory(Window):
     """The whole trajectory from Γ, as in the paper."""
 
     kind: ClassVar[str] = "trajectory"
-    boundary: Boundary = setting(Splines(), option=True, help="values of the eigenfunctions at the initial states")
+    boundary: Boundary = setting(
+        BoundarySplines(), option=True, help="values of the eigenfunctions at the initial states"
+    )
 
     @property
     def cut(self) -> float | None:

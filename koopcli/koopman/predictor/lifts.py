@@ -10,7 +10,7 @@ from koopcli.records import FloatArray, Packed
 Observed = Callable[[FloatArray], FloatArray]
 
 
-class Lift(Protocol):
+class Observables(Protocol):
     """What a predictor asks of its ψ."""
 
     @property

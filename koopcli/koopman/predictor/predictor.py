@@ -14,13 +14,13 @@ from koopcli.errors import InvalidValueError
 from koopcli.koopman.predictor.coverage import Coverage
 from koopcli.koopman.predictor.dynamics import DYNAMICS, Dynamics
 from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
-from koopcli.koopman.predictor.lifts import Lift
+from koopcli.koopman.predictor.lifts import Observables
 from koopcli.koopman.predictor.regression import Regression
 from koopcli.koopman.predictor.trust import Trust
 from koopcli.progress import Progress, silent
 from koopcli.records import Array, Channels, FloatArray, Meta, Packed
 
-UnpackLift = Callable[[Packed, Dynamics], Lift]  # of what is stored of a lift, and the dynamics that go with it
+UnpackLift = Callable[[Packed, Dynamics], Observables]  # of what is stored of a lift, and the dynamics that go with it
 EXTRAPOLATES = "continue the functions fitted inside"
 
 
@@ -28,7 +28,7 @@ EXTRAPOLATES = "continue the functions fitted inside"
 class Predictor(Content):
     """x̂ = C z with z = ψ(x) and its dynamics, such as z⁺ = A z + B u: eqs. (4.1), (4.2) of docs/equations.md."""
 
-    observables: Lift
+    observables: Observables
     """The lift ψ."""
     dynamics: Dynamics
     """How the lifted state moves on."""

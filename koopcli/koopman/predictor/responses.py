@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from koopcli.koopman.predictor.lifts import Lift
+from koopcli.koopman.predictor.lifts import Observables
 from koopcli.koopman.predictor.modes import Modes
 from koopcli.progress import Progress, silent
 from koopcli.records import FloatArray
@@ -19,7 +19,7 @@ Seen = Callable[[FloatArray], FloatArray]  # rows (R, N) to what they see of the
 
 
 def linear(
-    lift: Lift, A: FloatArray | Modes, B: FloatArray, C: FloatArray, x0: FloatArray, u: FloatArray
+    lift: Observables, A: FloatArray | Modes, B: FloatArray, C: FloatArray, x0: FloatArray, u: FloatArray
 ) -> FloatArray:
     """x̂_k = C A^k ψ(x_0) + Σ_i C A^(k-1-i) B u_i (4.3), (n, steps+1, n_x), for ``x0`` (n, n_x), ``u`` (n, steps, n_u).
 
@@ -105,7 +105,7 @@ Advance = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 def rolled(
-    lift: Lift, advance: Advance, C: FloatArray, x0: FloatArray, u: FloatArray, progress: Progress = silent
+    lift: Observables, advance: Advance, C: FloatArray, x0: FloatArray, u: FloatArray, progress: Progress = silent
 ) -> FloatArray:
     """x̂_k = C z_k with z⁺ = ``advance(z, u)``, shapes as in :func:`linear`.
 

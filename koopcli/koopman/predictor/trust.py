@@ -36,12 +36,12 @@ class Trust(Content):
 
         Not a number where the state is none.
         """
-        found = np.full(len(x), np.nan)
+        bounds = np.full(len(x), np.nan)
         finite = np.isfinite(x).all(axis=1)
         count = min(NEIGHBOURS, len(self.states))
         near = self._tree.query(placed(x[finite], self.scale, self.power), count)[1].reshape(-1, count)
-        found[finite] = self.factor * np.exp(np.log(self.errors)[near].mean(axis=1))
-        return found
+        bounds[finite] = self.factor * np.exp(np.log(self.errors)[near].mean(axis=1))
+        return bounds
 
     @cached_property
     def _tree(self) -> Any:

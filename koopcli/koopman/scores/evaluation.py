@@ -140,11 +140,11 @@ class Evaluation(Content):
 
     def _segments(self) -> list[Meta]:
         """The mean RMSE of the predictions that start from each sample."""
-        found = []
+        segments = []
         for k in np.unique(self.start).tolist():
             rows = (self.start == k) & ~self.diverged
-            found.append({"start": k, "rmse": metrics.summary(self.rmse[rows])["mean"]})
-        return found
+            segments.append({"start": k, "rmse": metrics.summary(self.rmse[rows])["mean"]})
+        return segments
 
     def table(self) -> tuple[list[str], list[list[float]]]:
         """The per-trajectory table: column names with units, and rows."""

@@ -52,10 +52,10 @@ class Swept(Content):
     def groups(self) -> list[list[int]]:
         """The cells that differ in nothing but a seed, together."""
         kept = [i for i, name in enumerate(self.names) if name.rpartition(".")[2] != REPEATS]
-        found: dict[tuple[int, ...], list[int]] = {}
+        groups: dict[tuple[int, ...], list[int]] = {}
         for cell, place in enumerate(self.places[:, kept].tolist()):
-            found.setdefault(tuple(place), []).append(cell)
-        return list(found.values())
+            groups.setdefault(tuple(place), []).append(cell)
+        return list(groups.values())
 
     def figures(self) -> Meta:
         """What scripts read."""
@@ -108,10 +108,10 @@ def swept(
 ) -> Swept:
     """The scores of cells from the ``figures`` of their evaluations."""
     columns: dict[str, FloatArray] = {
-        column: np.array([one[error][statistic] for one in figures], dtype=float)
+        column: np.array([numbers[error][statistic] for numbers in figures], dtype=float)
         for column, (error, statistic) in SCORES.items()
     }
-    columns |= {name: np.array([one[name] for one in figures], dtype=float) for name in COUNTS}
+    columns |= {name: np.array([numbers[name] for numbers in figures], dtype=float) for name in COUNTS}
     where = np.array(places, dtype=np.int64).reshape(len(places), len(names))
     return Swept(tuple(names), tuple(map(tuple, values)), where, columns)
 

@@ -40,8 +40,8 @@ class Cloud:
         return np.asarray(np.take_along_axis(pool, order, axis=1))
 
     def _nearest(self, y: FloatArray, count: int) -> IndexArray:
-        found = np.asarray(self._tree.query(y, count, workers=-1)[1], dtype=np.intp)
-        return found.reshape(len(y), count)
+        indices = np.asarray(self._tree.query(y, count, workers=-1)[1], dtype=np.intp)
+        return indices.reshape(len(y), count)
 
     @cached_property
     def _tree(self) -> Any:

@@ -18,7 +18,7 @@ MOST_STEPS = 4000
 SAME = 1e-9  # nodes nearer to one another are one
 
 
-class Linear:
+class LinearInterpolation:
     """Barycentric weights of the simplex around a place; outside the hull the nearest node.
 
     The simplex is found by a visibility walk, all places at once: from a simplex at the nearest node, each step
@@ -109,6 +109,6 @@ class LinearLift(Lift):
     kind: ClassVar[str] = "linear"
     beyond = "take the nearest sample"
 
-    def make(self, nodes: Cloud) -> Linear:
+    def make(self, nodes: Cloud) -> LinearInterpolation:
         """The lookup among ``nodes``."""
-        return Linear(nodes)
+        return LinearInterpolation(nodes)

@@ -71,8 +71,8 @@ def search(lookup: Lookup, y: FloatArray) -> tuple[IndexArray, FloatArray]:
     finite = np.isfinite(y).all(axis=1)
     if finite.all():
         return lookup(y)
-    found, given = lookup(y[finite])
-    indices = np.zeros((len(y), found.shape[1]), dtype=np.intp)
+    near, given = lookup(y[finite])
+    indices = np.zeros((len(y), near.shape[1]), dtype=np.intp)
     weights = np.full(indices.shape, np.nan)
-    indices[finite], weights[finite] = found, given
+    indices[finite], weights[finite] = near, given
     return indices, weights

@@ -28,8 +28,8 @@ class MovingLeastSquares:
 
     def __call__(self, y: FloatArray) -> tuple[IndexArray, FloatArray]:
         """The neighbours (n, q) of each of ``y`` (n, n_x) and what each of their values counts."""
-        found = self._nodes.near(y)
-        return found, trend_weights(self._nodes.places[found] - y[:, np.newaxis])
+        near = self._nodes.near(y)
+        return near, trend_weights(self._nodes.places[near] - y[:, np.newaxis])
 
 
 def trend_weights(near: FloatArray) -> FloatArray:

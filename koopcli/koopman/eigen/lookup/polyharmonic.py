@@ -34,14 +34,14 @@ class Polyharmonic:
 
     def __call__(self, y: FloatArray) -> tuple[IndexArray, FloatArray]:
         """The neighbours (n, q) of each of ``y`` (n, n_x) and what each of their values counts."""
-        found = self._nodes.near(y)
-        weights = np.empty(found.shape)
+        near = self._nodes.near(y)
+        weights = np.empty(near.shape)
         for start in range(0, len(y), TOGETHER):
             rows = slice(start, start + TOGETHER)
-            way = self._nodes.places[found[rows]] - y[rows, np.newaxis]
+            way = self._nodes.places[near[rows]] - y[rows, np.newaxis]
             size = np.sqrt((way**2).sum(axis=2).max(axis=1))
             weights[rows] = _bounded(way / np.maximum(size, np.finfo(float).tiny)[:, np.newaxis, np.newaxis])
-        return found, weights
+        return near, weights
 
 
 def _bounded(near: FloatArray) -> FloatArray:

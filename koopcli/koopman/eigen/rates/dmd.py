@@ -64,11 +64,11 @@ def lattice(rates: ComplexArray, degree: int) -> ComplexArray:
     """
     powers = [p for p in product(range(degree + 1), repeat=len(rates)) if sum(p) <= degree]
     powers.sort(key=lambda p: (sum(p), [-n for n in p]))
-    found: list[complex] = []
+    kept: list[complex] = []
     for p in powers:
         rate = complex(np.dot(p, rates))
         if abs(rate.imag) <= SAME * (1 + abs(rate)):
             rate = complex(rate.real)
-        if rate.imag >= 0 and all(abs(rate - other) > SAME * (1 + abs(rate)) for other in found):
-            found.append(rate)
-    return np.array([one for rate in found for one in ((rate,) if rate.imag == 0 else (rate, rate.conjugate()))])
+        if rate.imag >= 0 and all(abs(rate - earlier) > SAME * (1 + abs(rate)) for earlier in kept):
+            kept.append(rate)
+    return np.array([value for rate in kept for value in ((rate,) if rate.imag == 0 else (rate, rate.conjugate()))])

@@ -55,7 +55,7 @@ def searched(x: Windows, dt: float, comb: Comb) -> ComplexArray:
         gradient[2 * count :] = slope.real[2 * count :]
         return math.log(residual), gradient / residual
 
-    found = minimize(
+    optimum = minimize(
         left,
         np.concatenate([pairs.real, pairs.imag, single.real]),
         jac=True,
@@ -63,7 +63,7 @@ def searched(x: Windows, dt: float, comb: Comb) -> ComplexArray:
         bounds=[(SLOWEST, FASTEST)] * count + [(LOWEST, HIGHEST)] * count + [(SLOWEST, FASTEST)] * len(single),
         options={"maxiter": ROUNDS},
     )
-    return _assembled(found.x, count)
+    return _assembled(optimum.x, count)
 
 
 def _assembled(values: FloatArray, pairs: int) -> ComplexArray:

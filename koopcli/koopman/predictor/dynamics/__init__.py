@@ -9,7 +9,7 @@ from koopcli.koopman.predictor.dynamics.bilinear import Bilinear
 from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
 from koopcli.koopman.predictor.dynamics.generator import Generator
 from koopcli.koopman.predictor.dynamics.linear import Linear
-from koopcli.koopman.predictor.lifts import Lift
+from koopcli.koopman.predictor.lifts import Observables
 from koopcli.koopman.predictor.modes import ComplexArray
 from koopcli.progress import Progress
 from koopcli.records import BoolArray, Channels, FloatArray, Packed
@@ -36,10 +36,12 @@ class Dynamics(Protocol):
     def acting(self) -> BoolArray:
         """Which inputs (n_u,) move the lifted state at all."""
 
-    def predict(self, lift: Lift, C: FloatArray, x0: FloatArray, u: FloatArray, progress: Progress) -> FloatArray:
+    def predict(
+        self, lift: Observables, C: FloatArray, x0: FloatArray, u: FloatArray, progress: Progress
+    ) -> FloatArray:
         """x̂_k = C z_k (n, steps+1, n_x) from ``x0`` (n, n_x), lifted once, under ``u`` (n, steps, n_u)."""
 
-    def stepper(self, lift: Lift, C: FloatArray) -> Callable[[FloatArray, FloatArray], FloatArray]:
+    def stepper(self, lift: Observables, C: FloatArray) -> Callable[[FloatArray, FloatArray], FloatArray]:
         """The function of states (n, n_x), lifted afresh, and inputs (n, n_u) to the next states (n, n_x)."""
 
     def pack(self, inputs: Channels) -> Packed:

@@ -10,7 +10,7 @@ import numpy as np
 
 from koopcli.koopman.predictor import responses
 from koopcli.koopman.predictor.dynamics.shared import Spectral
-from koopcli.koopman.predictor.lifts import Lift
+from koopcli.koopman.predictor.lifts import Observables
 from koopcli.koopman.predictor.modes import ComplexArray, Modes
 from koopcli.progress import Progress
 from koopcli.records import Array, BoolArray, Channels, FloatArray, Packed
@@ -39,11 +39,13 @@ class Diagonal(Spectral):
         """None."""
         return np.zeros(self.inputs, dtype=bool)
 
-    def predict(self, lift: Lift, C: FloatArray, x0: FloatArray, u: FloatArray, progress: Progress) -> FloatArray:
+    def predict(
+        self, lift: Observables, C: FloatArray, x0: FloatArray, u: FloatArray, progress: Progress
+    ) -> FloatArray:
         """C A^k ψ(x_0), whatever the inputs are."""
         return responses.linear(lift, self.modes, np.zeros((len(self), 0)), C, x0, u[..., :0])
 
-    def stepper(self, lift: Lift, C: FloatArray) -> Callable[[FloatArray, FloatArray], FloatArray]:
+    def stepper(self, lift: Observables, C: FloatArray) -> Callable[[FloatArray, FloatArray], FloatArray]:
         """C A ψ(x)."""
         onward = lift.onto(C @ self.modes)
         return lambda x, _: onward(x)

@@ -11,7 +11,7 @@ import numpy as np
 
 from koopcli.koopman.predictor import responses
 from koopcli.koopman.predictor.dynamics.shared import Spectral, of_inputs
-from koopcli.koopman.predictor.lifts import Lift
+from koopcli.koopman.predictor.lifts import Observables
 from koopcli.koopman.predictor.modes import ComplexArray
 from koopcli.progress import Progress
 from koopcli.records import Array, BoolArray, Channels, FloatArray, Packed
@@ -40,11 +40,13 @@ class Linear(Spectral):
         """Which inputs have a column in B."""
         return np.asarray(self.B.any(axis=0))
 
-    def predict(self, lift: Lift, C: FloatArray, x0: FloatArray, u: FloatArray, progress: Progress) -> FloatArray:
+    def predict(
+        self, lift: Observables, C: FloatArray, x0: FloatArray, u: FloatArray, progress: Progress
+    ) -> FloatArray:
         """Eq. (4.3)."""
         return responses.linear(lift, self.A, self.B, C, x0, u)
 
-    def stepper(self, lift: Lift, C: FloatArray) -> Callable[[FloatArray, FloatArray], FloatArray]:
+    def stepper(self, lift: Observables, C: FloatArray) -> Callable[[FloatArray, FloatArray], FloatArray]:
         """C A ψ(x) + C B u."""
         onward, driven = lift.onto(C @ self.A), (C @ self.B).T
         return lambda x, u: onward(x) + u @ driven

@@ -10,7 +10,7 @@ import numpy as np
 
 from koopcli.content import Content
 from koopcli.koopman.predictor import responses
-from koopcli.koopman.predictor.lifts import Lift
+from koopcli.koopman.predictor.lifts import Observables
 from koopcli.koopman.predictor.modes import ComplexArray
 from koopcli.progress import Progress
 from koopcli.records import Array, Channels, FloatArray
@@ -38,11 +38,13 @@ class Rolled(Spectral):
     def advance(self) -> responses.Advance:
         """The function of z (n, N) and u (n, n_u) to z⁺."""
 
-    def predict(self, lift: Lift, C: FloatArray, x0: FloatArray, u: FloatArray, progress: Progress) -> FloatArray:
+    def predict(
+        self, lift: Observables, C: FloatArray, x0: FloatArray, u: FloatArray, progress: Progress
+    ) -> FloatArray:
         """C z_k with z rolled from ψ(x_0)."""
         return responses.rolled(lift, self.advance, C, x0, u, progress)
 
-    def stepper(self, lift: Lift, C: FloatArray) -> Callable[[FloatArray, FloatArray], FloatArray]:
+    def stepper(self, lift: Observables, C: FloatArray) -> Callable[[FloatArray, FloatArray], FloatArray]:
         """C times the next z."""
         return lambda x, u: np.asarray(self.advance(lift.lift(x), u) @ C.T)
 

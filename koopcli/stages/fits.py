@@ -5,13 +5,13 @@ from __future__ import annotations
 from koopcli.stages import baseline, fit_edmd, fit_eigen
 from koopcli.stages.base import Outlook, Stage, Task
 
-MAKERS: dict[str, Stage] = {module.STAGE.name: module.STAGE for module in (fit_edmd, fit_eigen, baseline)}
+FITS: dict[str, Stage] = {module.STAGE.name: module.STAGE for module in (fit_edmd, fit_eigen, baseline)}
 
-LIFTED = tuple(name for name in MAKERS if name != baseline.STAGE.name)  # of predictors with lifted states
+LIFTED = tuple(name for name in FITS if name != baseline.STAGE.name)  # of predictors with lifted states
 
 
 def outlook(predictor: Task) -> Outlook:
     """What the predictor of a task will be."""
-    predicts = MAKERS[predictor.stage].predicts
+    predicts = FITS[predictor.stage].predicts
     assert predicts is not None
     return predicts(predictor)
