@@ -1,4 +1,4 @@
-"""Declared settings: typed, bounded dataclass fields, and the one place that turns raw values into them."""
+"""The one place that turns raw values into declared settings: typed, bounded, each error with its origin."""
 
 from __future__ import annotations
 
@@ -6,19 +6,14 @@ import math
 import sys
 import types
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from difflib import get_close_matches
-from functools import cache
-from importlib import import_module
-from pkgutil import iter_modules
-from typing import Any, ClassVar, Literal, Self, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, Self, TypeVar, Union, get_args, get_origin
 
+from koopcli.choices import Choice, Values, choices, hints_of, names_of, taken, told, without_none
 from koopcli.errors import InvalidValueError, KoopError, MisplacedError, UsageError
 
 T = TypeVar("T")
-R = TypeVar("R")
-Values = dict[str, Any]
-SEED_LIMIT = 2**63 - 1
 
 
 @dataclass(frozen=True)
@@ -53,27 +48,6 @@ class Layer:
         return Layer({key: value for key, value in self.values.items() if belongs(key, value)}, self.origin)
 
 
-class Choice:
-    """One of several kinds, each with settings of its own: a base class for the choice, a frozen dataclass for a kind.
-
-    The settings of a kind are declared by the class that uses them. They are named without it: ``order`` stands beside
-    ``basis`` and holds for the kinds that have it. The first line of a kind's docstring says in its help what it is.
-    ``afresh``: whether a change of the kind leaves behind what was set for the kind before, where one name means
-    different things in two kinds.
-    """
-
-    kind: ClassVar[str]
-    afresh: ClassVar[bool] = False
-
-    @classmethod
-    def kinds(cls) -> dict[str, type[Self]]:
-        """The kinds by name, in the order in which they were declared."""
-        named: dict[str, type[Self]] = {}
-        for sub in cls.__subclasses__():
-            named |= ({sub.kind: sub} if "kind" in vars(sub) else {}) | sub.kinds()
-        return named
-
-
 class Settings:
     """Settings with choices, made and changed by the names that people write."""
 
@@ -85,95 +59,6 @@ class Settings:
     def but(self, **values: object) -> Self:
         """These with other ``values``; a kind that is changed keeps what is not at its default and both kinds have."""
         return build_layers(type(self), [Layer(told(self)), Layer(values)])
-
-
-def import_files(package: str, folder: Sequence[str]) -> None:
-    """Import every file of the ``folder`` of a ``package``, which makes the kinds in them known."""
-    for file in iter_modules(folder):
-        import_module(f"{package}.{file.name}")
-
-
-def setting(
-    default: Any = MISSING,
-    *,
-    help: str = "",
-    low: float | None = None,
-    above: float | None = None,
-    high: float | None = None,
-    unit: str = "",
-    unique: bool = False,
-    empty: bool = False,
-    option: bool = False,
-) -> Any:
-    """A dataclass field with its documentation and bounds: ``low <= value``, ``above < value``, ``value <= high``.
-
-    ``unique``: a list without repetition; ``empty``: a list that may have no entry; ``option``: the command of these
-    settings has an option for it.
-    """
-    meta = {"help": help, "low": low, "above": above, "high": high, "unit": unit, "unique": unique, "empty": empty}
-    meta["option"] = option
-    return field(metadata=meta) if default is MISSING else field(default=default, metadata=meta)
-
-
-def taken_from(section: str) -> Any:
-    """A dataclass field that is no setting: its value is taken from another ``section`` of an experiment."""
-    return field(metadata={"section": section})
-
-
-def _cached(of: Callable[[type], R]) -> Callable[[type], R]:
-    """What is worked out ``of`` a class once: an experiment is built of thousands of settings."""
-    return cache(of)
-
-
-def taken(cls: type) -> dict[str, str]:
-    """The fields of a settings class that are no settings, each with the section that it is taken from."""
-    return {f.name: f.metadata["section"] for f in fields(cls) if "section" in f.metadata}
-
-
-@_cached
-def choices(cls: type) -> dict[str, type[Choice]]:
-    """The settings of a class that are choices, each with its base class."""
-    bare = {name: without_none(hint) for name, hint in hints_of(cls).items()}
-    return {name: hint for name, hint in bare.items() if isinstance(hint, type) and issubclass(hint, Choice)}
-
-
-@_cached
-def names_of(cls: type) -> tuple[str, ...]:
-    """The settings of ``cls`` and of all kinds that it can choose."""
-    own = [f.name for f in fields(cls) if "help" in f.metadata]
-    of_kinds = [name for base in choices(cls).values() for kind in base.kinds().values() for name in names_of(kind)]
-    return tuple(dict.fromkeys([*own, *of_kinds]))
-
-
-def written(settings: Any) -> Values:
-    """Settings as plain values by their names: a choice by its kind, with the settings of that kind beside it."""
-    values: Values = {"kind": settings.kind} if isinstance(settings, Choice) else {}
-    for f in fields(settings):
-        value = getattr(settings, f.name)
-        if isinstance(value, Choice):
-            own = written(value)
-            values |= {f.name: own.pop("kind"), **own}
-        else:
-            values[f.name] = _written(value)
-    return values
-
-
-def told(settings: Any) -> Values:
-    """As :func:`written`, the settings alone that are not at their defaults."""
-    values: Values = {}
-    for f in fields(settings):
-        value = getattr(settings, f.name)
-        if isinstance(value, Choice):
-            values |= ({} if value.kind == getattr(f.default, "kind", "") else {f.name: value.kind}) | told(value)
-        elif value != f.default and f.name not in taken(type(settings)):
-            values[f.name] = value
-    return values
-
-
-def _written(value: Any) -> Any:
-    if is_dataclass(value):
-        return written(value)
-    return tuple(map(_written, value)) if isinstance(value, (list, tuple)) else value
 
 
 def restored(cls: type[T], values: Mapping[str, Any]) -> T:
@@ -354,20 +239,6 @@ def _elsewhere(name: str, key: str, section: str) -> str:
     """What is said of a value that is taken from another section."""
     remedy = f"choose it by {key}.name" if key == "vehicle" else f"set {section}.{key}"
     return f"'{name}' is {'the vehicle' if 'vehicle' in (key, section) else 'the simulation'}'s: {remedy}"
-
-
-@_cached
-def hints_of(cls: type) -> dict[str, Any]:
-    """The types of the fields of ``cls``."""
-    return get_type_hints(cls)
-
-
-def without_none(hint: Any) -> Any:
-    """The type of a setting where it has a value."""
-    if get_origin(hint) not in (Union, types.UnionType):
-        return hint
-    (inner,) = [part for part in get_args(hint) if part is not type(None)]
-    return inner
 
 
 def coerce(kind: Any, value: object, name: str, bounds: Mapping[str, Any], origin: Origin) -> object:

@@ -9,21 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from koopcli.checks import (
-    Choice,
-    Layer,
-    Settings,
-    build,
-    check_choice,
-    choose,
-    from_file,
-    names_of,
-    restored,
-    setting,
-    taken_from,
-    told,
-    written,
-)
+from koopcli.checks import Layer, Settings, build, check_choice, choose, from_file, restored
+from koopcli.choices import Choice, names_of, setting, taken_from, told, written
 from koopcli.errors import InvalidValueError, KoopError, MisplacedError, UsageError
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin
 
 import typer
 
-from koopcli.checks import Choice, choices, hints_of, taken, without_none
+from koopcli.choices import Choice, choices, hints_of, taken, without_none
 
 Command = Callable[..., None]
 

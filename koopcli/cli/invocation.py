@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from koopcli.checks import written
+from koopcli.choices import written
 from koopcli.config.changes import Changes, flat, parse_set
 from koopcli.console import Console, show_table
 from koopcli.errors import UnknownNameError, UsageError

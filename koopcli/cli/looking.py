@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from koopcli.checks import written
+from koopcli.choices import written
 from koopcli.cli.completion import complete_name, complete_stage
 from koopcli.cli.invocation import brief, open_store, print_json, write_csv
 from koopcli.cli.lineage import show_lineage

@@ -7,7 +7,7 @@ from dataclasses import MISSING
 from textwrap import fill
 from typing import Any, Literal, get_args, get_origin
 
-from koopcli.checks import Choice, without_none
+from koopcli.choices import Choice, without_none
 from koopcli.cli.app import whole
 from koopcli.cli.derived import ordered
 from koopcli.config.declared import every_setting

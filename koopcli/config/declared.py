@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import Field, fields
 from typing import Any, NamedTuple
 
-from koopcli.checks import choices, hints_of
+from koopcli.choices import choices, hints_of
 from koopcli.config.pictures import PlotOptions
 from koopcli.config.settings import About, Baseline, Evaluate, Reproduce, Simulate
 from koopcli.koopman.edmd.fit import FitEdmd

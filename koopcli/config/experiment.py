@@ -17,10 +17,8 @@ from koopcli.checks import (
     choose,
     chosen_kind,
     from_file,
-    names_of,
-    taken,
-    written,
 )
+from koopcli.choices import names_of, taken, written
 from koopcli.config.changes import SECTIONS, Changes, flat, nested
 from koopcli.config.data import locate
 from koopcli.config.declared import DECLARED, KINDS

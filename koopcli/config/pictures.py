@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from koopcli.checks import setting
+from koopcli.choices import setting
 from koopcli.config.shipped import Fingerprint
 from koopcli.vehicles.parameters import MagicFormula
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from koopcli.checks import SEED_LIMIT, setting, taken_from
+from koopcli.choices import SEED_LIMIT, setting, taken_from
 from koopcli.simulation.samples.sample import LARGEST, Excitation
 from koopcli.vehicles.parameters import VehicleParameters
 from koopcli.vehicles.plants.plant import PlantChoice

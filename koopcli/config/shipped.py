@@ -6,7 +6,7 @@ import hashlib
 import json
 from dataclasses import dataclass, is_dataclass
 
-from koopcli.checks import written
+from koopcli.choices import written
 from koopcli.config.data import data_folder
 from koopcli.vehicles.parameters import read_vehicle
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from koopcli.checks import told, written
+from koopcli.choices import told, written
 from koopcli.config.changes import flat
 from koopcli.config.data import data_folder
 from koopcli.config.experiment import DEFAULT_VEHICLE

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Literal
 
-from koopcli.checks import written
+from koopcli.choices import written
 from koopcli.config.experiment import Experiment
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.edmd.fit import FitEdmd

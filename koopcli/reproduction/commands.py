@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from koopcli.checks import written
+from koopcli.choices import written
 from koopcli.reproduction.edmd_cells import SPLINES, TEXTBOOK_ORDERS, Edmd
 from koopcli.reproduction.report import Run
 

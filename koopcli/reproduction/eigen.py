@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from koopcli.checks import written
+from koopcli.choices import written
 from koopcli.config.experiment import DEFAULT_VEHICLE, Experiment, vehicle_named
 from koopcli.config.paper import EIGEN_RMSE
 from koopcli.config.settings import Simulate

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 
-from koopcli.checks import written
+from koopcli.choices import written
 from koopcli.config.experiment import Experiment
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.eigen.fit import FitEigen

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from koopcli.checks import written
+from koopcli.choices import written
 from koopcli.config.experiment import load_experiment
 from koopcli.config.measured import COASTING, INPUTS, TYRES, WHEELS, Gain
 from koopcli.config.settings import FitName

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from koopcli.checks import taken, written
+from koopcli.choices import taken, written
 from koopcli.config.declared import KINDS
 from koopcli.config.experiment import Experiment
 from koopcli.errors import KoopError

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-from koopcli.checks import written
+from koopcli.choices import written
 from koopcli.config.changes import flat
 from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Series

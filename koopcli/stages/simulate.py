@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from koopcli.checks import restored, written
+from koopcli.checks import restored
+from koopcli.choices import written
 from koopcli.config.settings import Simulate
 from koopcli.errors import InvalidValueError
 from koopcli.progress import Progress

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from koopcli.checks import taken
+from koopcli.choices import taken
 from koopcli.config.experiment import Experiment
 from koopcli.config.pictures import Subject
 from koopcli.config.settings import Simulate

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
 
-from koopcli.checks import taken
+from koopcli.choices import taken
 from koopcli.config.experiment import Experiment
 from koopcli.figures.kit.registry import FIGURES
 from koopcli.simulation.portrait import measures, odd

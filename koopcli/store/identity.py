@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from koopcli.blocks import Blocks
-from koopcli.checks import written
+from koopcli.choices import written
 from koopcli.errors import InvalidValueError
 from koopcli.records import Packed
 

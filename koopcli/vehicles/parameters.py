@@ -8,7 +8,8 @@ from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
-from koopcli.checks import Origin, build, candidates, from_file, setting
+from koopcli.checks import Origin, build, candidates, from_file
+from koopcli.choices import setting
 from koopcli.errors import InvalidValueError
 from koopcli.parsing import parse_toml
 from koopcli.text import read_text

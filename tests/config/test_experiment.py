@@ -6,7 +6,7 @@ from typing import get_args, get_type_hints
 
 import pytest
 
-from koopcli.checks import Choice, choices, names_of
+from koopcli.choices import Choice, choices, names_of
 from koopcli.config import settings
 from koopcli.config.changes import SECTIONS, flat, parse_set, toml_value
 from koopcli.config.data import data_folder

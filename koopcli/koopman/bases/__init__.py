@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from koopcli.checks import import_files
+from koopcli.choices import import_files
 from koopcli.koopman.bases.basis import BasisChoice
 
 import_files(__name__, __path__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Protocol
 
-from koopcli.checks import Choice
+from koopcli.choices import Choice
 from koopcli.koopman.bases.moments import Products
 from koopcli.koopman.predictor.lifts import Observables
 from koopcli.records import FloatArray

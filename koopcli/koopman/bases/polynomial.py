@@ -11,7 +11,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from koopcli.checks import setting
+from koopcli.choices import setting
 from koopcli.content import Content
 from koopcli.koopman.bases.basis import BasisChoice
 from koopcli.koopman.bases.moments import Products, products_of

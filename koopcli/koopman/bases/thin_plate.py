@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from koopcli.checks import SEED_LIMIT, setting
+from koopcli.choices import SEED_LIMIT, setting
 from koopcli.content import Content
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.bases.basis import BasisChoice

@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from koopcli.checks import Settings, setting
+from koopcli.checks import Settings
+from koopcli.choices import setting
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.bases.basis import Basis, BasisChoice
 from koopcli.koopman.bases.polynomial import Tensor

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from koopcli.checks import Choice
+from koopcli.choices import Choice
 from koopcli.koopman.edmd.generator import generator_of
 from koopcli.koopman.edmd.operators import Operators
 from koopcli.koopman.predictor.dynamics import Dynamics

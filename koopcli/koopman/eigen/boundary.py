@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from koopcli.checks import SEED_LIMIT, Choice, setting
+from koopcli.choices import SEED_LIMIT, Choice, setting
 from koopcli.koopman.bases.thin_plate import draw_centres, thin_plate
 from koopcli.koopman.predictor.modes import Modes, exponentials
 from koopcli.records import BoolArray, FloatArray

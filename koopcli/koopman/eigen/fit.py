@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from koopcli.checks import Settings, setting
+from koopcli.checks import Settings
+from koopcli.choices import setting
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.eigen.lookup.lookup import Lift
 from koopcli.koopman.eigen.lookup.nearest import NearestLift

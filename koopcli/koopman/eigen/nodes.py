@@ -7,7 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from koopcli.checks import restored, written
+from koopcli.checks import restored
+from koopcli.choices import written
 from koopcli.content import Content
 from koopcli.koopman.eigen.lookup.cloud import Cloud
 from koopcli.koopman.eigen.lookup.lookup import Lift, Lookup, search

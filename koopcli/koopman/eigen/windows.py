@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from koopcli.checks import Choice, setting
+from koopcli.choices import Choice, setting
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.eigen import boundary
 from koopcli.koopman.eigen.boundary import Boundary, BoundarySplines

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
-from koopcli.checks import SEED_LIMIT, setting
+from koopcli.choices import SEED_LIMIT, setting
 from koopcli.progress import Progress
 from koopcli.simulation import sampling
 from koopcli.simulation.samples.sample import BOX, LARGEST, Drawn, Excitation, SampleChoice, check_box

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
-from koopcli.checks import SEED_LIMIT, setting, taken_from
+from koopcli.choices import SEED_LIMIT, setting, taken_from
 from koopcli.errors import InvalidValueError
 from koopcli.progress import Progress
 from koopcli.simulation import sampling

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from koopcli.checks import setting, taken_from
+from koopcli.choices import setting, taken_from
 from koopcli.progress import Progress
 from koopcli.simulation import sampling
 from koopcli.simulation.samples.sample import ENERGY, LARGEST, Drawn, SampleChoice

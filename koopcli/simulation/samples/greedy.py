@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from koopcli.checks import SEED_LIMIT, setting, taken_from
+from koopcli.choices import SEED_LIMIT, setting, taken_from
 from koopcli.errors import InvalidValueError
 from koopcli.progress import Progress
 from koopcli.records import FloatArray

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from koopcli.checks import SEED_LIMIT, setting
+from koopcli.choices import SEED_LIMIT, setting
 from koopcli.progress import Progress
 from koopcli.simulation import sampling
 from koopcli.simulation.samples.sample import BOX, LARGEST, Drawn, SampleChoice, check_box

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from koopcli.checks import setting, taken_from
+from koopcli.choices import setting, taken_from
 from koopcli.errors import InvalidValueError
 from koopcli.progress import Progress
 from koopcli.simulation.manoeuvres import MANOEUVRES, Driver, ManoeuvreName

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from koopcli.checks import SEED_LIMIT, setting
+from koopcli.choices import SEED_LIMIT, setting
 from koopcli.errors import InvalidValueError
 from koopcli.progress import Progress
 from koopcli.simulation import sampling

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 
-from koopcli.checks import Choice
+from koopcli.choices import Choice
 from koopcli.errors import InvalidValueError
 from koopcli.progress import Progress
 from koopcli.records import Channels, FloatArray

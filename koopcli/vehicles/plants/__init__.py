@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from koopcli.checks import build, import_files, restored
+from koopcli.checks import build, restored
+from koopcli.choices import import_files
 from koopcli.vehicles.parameters import VehicleParameters
 from koopcli.vehicles.plants.plant import Plant, PlantChoice
 

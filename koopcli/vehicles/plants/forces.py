@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from koopcli.checks import setting
+from koopcli.choices import setting
 from koopcli.records import Channels, FloatArray
 from koopcli.vehicles import body
 from koopcli.vehicles.parameters import TYRES, VehicleParameters

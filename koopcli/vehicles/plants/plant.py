@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import ClassVar, Protocol
 
-from koopcli.checks import Choice
+from koopcli.choices import Choice
 from koopcli.records import Channels, FloatArray
 from koopcli.vehicles.parameters import VehicleParameters
 

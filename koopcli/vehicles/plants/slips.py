@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
-from koopcli.checks import setting
+from koopcli.choices import setting
 from koopcli.records import Channels, FloatArray
 from koopcli.vehicles import body, tyre
 from koopcli.vehicles.axles import COMBINED_HELP, V_EPS_HELP, Axles, Combined, check_tyres

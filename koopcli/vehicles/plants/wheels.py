@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from koopcli.checks import setting
+from koopcli.choices import setting
 from koopcli.errors import InvalidValueError
 from koopcli.records import Channels, FloatArray
 from koopcli.vehicles import body, tyre

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from koopcli.checks import names_of
+from koopcli.choices import names_of
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import stored
 from koopcli.koopman.eigen.fit import with_images

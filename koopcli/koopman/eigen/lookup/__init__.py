@@ -5,6 +5,6 @@ A new way is one file in this folder: a lookup, and its choice with settings.
 
 from __future__ import annotations
 
-from koopcli.checks import import_files
+from koopcli.choices import import_files
 
 import_files(__name__, __path__)

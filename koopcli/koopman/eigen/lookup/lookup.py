@@ -6,7 +6,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from koopcli.checks import Choice, names_of
+from koopcli.choices import Choice, names_of
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.eigen.lookup.cloud import Cloud
 from koopcli.records import FloatArray, IndexArray

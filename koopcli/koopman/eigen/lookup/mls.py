@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from koopcli.checks import setting
+from koopcli.choices import setting
 from koopcli.koopman.eigen.lookup.cloud import Cloud
 from koopcli.koopman.eigen.lookup.lookup import Lift
 from koopcli.records import FloatArray, IndexArray

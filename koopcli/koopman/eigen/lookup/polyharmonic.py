@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from koopcli.checks import setting
+from koopcli.choices import setting
 from koopcli.koopman.eigen.lookup.cloud import Cloud
 from koopcli.koopman.eigen.lookup.lookup import Lift
 from koopcli.koopman.eigen.lookup.mls import trend_weights

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from koopcli.checks import import_files
+from koopcli.choices import import_files
 
 import_files(__name__, __path__)

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from koopcli.checks import setting
+from koopcli.choices import setting
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.eigen.rates.rates import Rates, Windows
 from koopcli.koopman.predictor.modes import ComplexArray

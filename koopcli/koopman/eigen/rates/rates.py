@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from koopcli.checks import Choice
+from koopcli.choices import Choice
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.predictor.modes import ComplexArray
 from koopcli.records import FloatArray

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from koopcli.checks import setting
+from koopcli.choices import setting
 from koopcli.koopman.eigen.rates.comb import Comb
 from koopcli.koopman.eigen.rates.rates import Windows
 from koopcli.koopman.predictor.modes import ComplexArray, exponentials
