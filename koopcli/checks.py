@@ -102,14 +102,16 @@ def choose(
     prefix: str,
     what: str,
     beside: Mapping[str, Any] | None = None,
+    table: str = "",
 ) -> Any:
     """The choice of one of ``kinds``, the ``usual`` one unless a layer names another, with its settings.
 
     A layer may have the name of a ``kind``, a table for a kind, in effect or not, and settings without a table, which
-    hold for the kinds that have them. ``what`` is chosen, in words. Raises as :func:`build`, and for a setting that
+    hold for the kinds that have them. ``what`` is chosen, in words; ``table``: where the tables of kinds stand within
+    the ``prefix`` of names. Raises as :func:`build`, and for a setting that
     the kind in effect in its layer does not have.
     """
-    check_choice(kinds, layers, usual, prefix, what)
+    check_choice(kinds, layers, usual, prefix, what, table)
     kind = chosen_kind(kinds, layers, usual)
     first, before = 0, usual
     for i, layer in enumerate(layers):
@@ -119,15 +121,20 @@ def choose(
         before = now
     own = []
     for i, layer in enumerate(layers):
-        table = layer.values[kind] if _is_table(kind, layer.values.get(kind), kinds) else {}
+        of_kind = layer.values[kind] if _is_table(kind, layer.values.get(kind), kinds) else {}
         known = names_of(kinds[kind]) if i >= first else ()
         beside_it = layer.only(lambda key, value: key in known and not _is_table(key, value, kinds))  # noqa: B023
-        own.append(Layer({**table, **beside_it.values}, layer.origin))
+        own.append(Layer({**of_kind, **beside_it.values}, layer.origin))
     return build_layers(kinds[kind], own, prefix, {name: (beside or {})[name] for name in taken(kinds[kind])})
 
 
 def check_choice(
-    kinds: Mapping[str, type[Choice]], layers: Sequence[Layer], usual: str | None, prefix: str, what: str
+    kinds: Mapping[str, type[Choice]],
+    layers: Sequence[Layer],
+    usual: str | None,
+    prefix: str,
+    what: str,
+    table: str = "",
 ) -> None:
     """Refuse what no kind would take, whichever is in effect in the end, and what the kind of its layer does not have.
 
@@ -145,8 +152,8 @@ def check_choice(
         for key, value in layer.values.items():
             if _is_table(key, value, kinds):
                 for name in value:
-                    _check_owner(kinds, key, name, layer.origin, f"{prefix}{key}.", what)
-                _checked(kinds[key], [Layer(value, layer.origin)], f"{prefix}{key}.")
+                    _check_owner(kinds, key, name, layer.origin, f"{prefix}{table}{key}.", what)
+                _checked(kinds[key], [Layer(value, layer.origin)], f"{prefix}{table}{key}.")
             elif kind is None:
                 _check_any(kinds, Layer({key: value}, layer.origin), prefix)
             elif key != "kind":
@@ -226,9 +233,9 @@ def _checked_choice(cls: type, name: str, layers: Sequence[Layer], prefix: str) 
         beside = {key: value for key, value in layer.values.items() if key in of_kinds and key not in _own(cls)}
         own.append(Layer({**table, **beside}, layer.origin))
     if default is None and not any("kind" in layer.values for layer in own):
-        check_choice(kinds, own, None, prefix, name)
+        check_choice(kinds, own, None, prefix, name, f"{name}.")
         return {}
-    return {name: choose(kinds, own, getattr(default, "kind", None), prefix, name)}
+    return {name: choose(kinds, own, getattr(default, "kind", None), prefix, name, table=f"{name}.")}
 
 
 def _own(cls: type) -> set[str]:

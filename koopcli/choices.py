@@ -54,6 +54,11 @@ class Choice:
     kind: ClassVar[str]
     afresh: ClassVar[bool] = False
 
+    def __init_subclass__(cls) -> None:
+        for name in vars(cls).get("__annotations__", {}):
+            if any(callable(getattr(base, name, None)) for base in cls.__mro__[1:]):
+                raise TypeError(f"no setting of {cls.__name__} can be called '{name}': that is a method of its kind")
+
     @classmethod
     def kinds(cls) -> dict[str, type[Self]]:
         """The kinds by name, in the order in which they were declared."""
@@ -111,6 +116,29 @@ def written(settings: Any) -> Values:
         else:
             values[f.name] = _written(value)
     return values
+
+
+def essential(settings: Any) -> Values:
+    """Settings by which a result is known: what is not at its default, and what is taken from other sections.
+
+    What is added later with a default changes nothing here. The inverse is ``koopcli.checks.restored``.
+    """
+    values: Values = {"kind": settings.kind} if isinstance(settings, Choice) else {}
+    for f in fields(settings):
+        value = getattr(settings, f.name)
+        if isinstance(value, Choice):
+            own = essential(value)
+            kind = own.pop("kind")
+            values |= {**({} if kind == getattr(f.default, "kind", None) else {f.name: kind}), **own}
+        elif value != f.default:
+            values[f.name] = _essential(value)
+    return values
+
+
+def _essential(value: Any) -> Any:
+    if is_dataclass(value):
+        return essential(value)
+    return tuple(map(_essential, value)) if isinstance(value, (list, tuple)) else value
 
 
 def told(settings: Any) -> Values:

@@ -52,6 +52,6 @@ class LockTimeoutError(KoopError):
 
 
 class NewerFormatError(KoopError):
-    """A record written by a newer version of the program."""
+    """A record written by a version of the program with another format."""
 
     exit_code = 8

@@ -99,6 +99,7 @@ def _settings(a: Record, b: Record, shelf: Store) -> Pairs:
     """The settings in which two artefacts or what they were made from differ, by role, stage and name."""
     from koopcli.stages.compare import differing
     from koopcli.stages.lineage import lineage
+    from koopcli.stages.recorded import all_settings
 
     behind_a, behind_b = (dict(lineage(record, shelf).behind()) for record in (a, b))
     pairs: Pairs = {}
@@ -108,7 +109,7 @@ def _settings(a: Record, b: Record, shelf: Store) -> Pairs:
         if x is None or y is None or x.stage != y.stage:
             pairs[f"{before}stage"] = (x.stage if x else None, y.stage if y else None)
             continue
-        first, second = ({**record.recipe["settings"], "version": record.recipe["version"]} for record in (x, y))
+        first, second = ({**all_settings(record), "version": record.recipe["version"]} for record in (x, y))
         pairs |= {f"{before}{x.stage}.{name}": pair for name, pair in differing(first, second).items()}
     return pairs
 

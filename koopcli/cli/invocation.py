@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from koopcli.choices import written
-from koopcli.config.changes import Changes, flat, parse_set
+from koopcli.config.changes import Changes, flat, nested, parse_set
 from koopcli.console import Console, show_table
 from koopcli.errors import UnknownNameError, UsageError
 from koopcli.text import printable
@@ -143,10 +143,8 @@ def begin(
     from koopcli.stages.workers import Workers
 
     sharing = Workers(workers, cluster)
-    changes = parse_set(assignments or [])
-    for section, values in (options or {}).items():
-        changes.setdefault(section, {}).update({key: v for key, v in values.items() if v is not None})
-    changes = {section: values for section, values in changes.items() if values}
+    told = [(f"{section}.{key}", v) for section, values in (options or {}).items() for key, v in values.items()]
+    changes = nested([*flat(parse_set(assignments or [])), *((name, v) for name, v in told if v is not None)])
     for name, _ in flat(changes):
         if name.partition(".")[0] not in sections:
             raise UsageError(f"--set {name} changes nothing here; this command uses {', '.join(sections)}")

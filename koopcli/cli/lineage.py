@@ -57,8 +57,10 @@ def _label(ancestor: Ancestor) -> Any:
 
 
 def _described(ancestor: Ancestor) -> dict[str, Any]:
+    from koopcli.stages.recorded import all_settings
+
     record = ancestor.record
-    about = {"bytes": record.size, "settings": record.recipe["settings"]} if record is not None else {}
+    about = {"bytes": record.size, "settings": all_settings(record)} if record is not None else {}
     return {
         "name": _name(ancestor),
         "state": ancestor.state,

@@ -55,11 +55,23 @@ def nested(named: Iterable[tuple[str, Any]]) -> Changes:
             raise UsageError(f"--set {name[:20]}…: {TooDeepError()}: name a setting, such as vehicle.Jzz")
         table = changes.setdefault(section, {})
         for key in keys[:-1]:
-            table = table.setdefault(key, {})
-            if not isinstance(table, dict):
-                raise UsageError(f"--set {name}: '{key}' is given a value of its own as well")
-        table[keys[-1]] = value
+            if not isinstance(table.setdefault(key, {}), dict):
+                table[key] = {"kind": _kind(name, key, table[key])}
+            table = table[key]
+        if isinstance(table.get(keys[-1]), dict):
+            table[keys[-1]]["kind"] = _kind(name, keys[-1], value)
+        else:
+            table[keys[-1]] = value
     return changes
+
+
+def _kind(name: str, key: str, value: Any) -> Any:
+    """The ``value`` of a choice that has a table too: its kind. Raises ``UsageError`` for what is no choice."""
+    from koopcli.config.declared import is_choice  # noqa: PLC0415  (which the names of commands do without)
+
+    if not is_choice(key):
+        raise UsageError(f"--set {name}: '{key}' is given a value of its own as well")
+    return value
 
 
 def flat(changes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import Field, fields
 from typing import Any, NamedTuple
 
-from koopcli.choices import choices, hints_of
+from koopcli.choices import Choice, choices, hints_of, without_none
 from koopcli.config.pictures import PlotOptions
 from koopcli.config.settings import About, Baseline, Evaluate, Reproduce, Simulate
 from koopcli.koopman.edmd.fit import FitEdmd
@@ -69,3 +69,9 @@ def _of(table: str, cls: type[Any]) -> Iterator[Declared]:
         if f.name in choices(cls):
             for name, kind in choices(cls)[f.name].kinds().items():
                 yield from _of(f"{table}.{f.name}.{name}", kind)
+
+
+def is_choice(name: str) -> bool:
+    """Whether a setting of this ``name`` is a choice among kinds."""
+    bare = (without_none(setting.hint) for setting in every_setting() if setting.name == name)
+    return any(isinstance(hint, type) and issubclass(hint, Choice) for hint in bare)

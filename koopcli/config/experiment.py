@@ -216,7 +216,9 @@ def _read(path: Path, here: Origin) -> Changes:
     try:
         content = parse_toml(read_text(path))
     except (OSError, ValueError) as error:
-        raise InvalidValueError(here.say(f"cannot read the experiment file: {error}")) from error
+        twice = 'a choice that has tables is made in its own, such as kind = "total" in [fit-edmd.basis]'
+        remedy = f": {twice}" if "overwrite" in str(error) else ""
+        raise InvalidValueError(here.say(f"cannot read the experiment file: {error}{remedy}")) from error
     for section, values in content.items():
         if not isinstance(values, dict):
             raise InvalidValueError(here.say(f"'{section}' must stand in a table such as [sample]"))

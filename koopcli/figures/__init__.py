@@ -11,16 +11,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-# what is taken of these is data, not something drawn
 PLAIN = (
-    "config/experiment",
-    "config/settings",
-    "errors",
-    "records",
-    "simulation/samples/",
-    "koopman/eigen/fit",
-    "koopman/eigen/windows",
-)
+    *(f"config/{module}" for module in ("experiment", "pictures", "settings")),
+    *("errors", "records", "simulation/samples/", "koopman/eigen/fit", "koopman/eigen/windows"),
+)  # what is taken of these is data, not something drawn
+IMPORTED = re.compile(r"^from koopcli\.([\w.]+) import", re.M)
 NAMES = sorted(path.stem.replace("_", "-") for path in Path(__file__).parent.glob("[!_.]*.py"))
 
 
@@ -30,25 +25,21 @@ def module_of(name: str) -> Any:
 
 
 @cache
-def source_digest() -> str:
-    """Digest of the code that draws, and of the modules it takes numbers from.
+def source_digest(name: str) -> str:
+    """Digest of the code that draws the figure ``name``, and of the modules that it takes numbers from.
 
     It is part of a figure's recipe, since no test compares pictures.
     """
     digest = hashlib.sha256()
-    for path in drawing_code():
+    for path in drawing_code(name):
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 
 
-def drawing_code() -> list[Path]:
-    """The files of this package, then those elsewhere in koopcli that they import from."""
+def drawing_code(name: str) -> list[Path]:
+    """The file of a figure, all of ``kit``, and the modules that the figure computes with, not what those import."""
     here = Path(__file__).parent
-    own = sorted(here.rglob("*.py"))
-    taken = {
-        name.replace(".", "/")
-        for path in own
-        for name in re.findall(r"^from koopcli\.([\w.]+) import", path.read_text(), re.M)
-    }
-    elsewhere = sorted(name for name in taken if not name.startswith((*PLAIN, "figures")))
-    return [*own, *(here.parent / f"{name}.py" for name in elsewhere)]
+    own = here / f"{name.replace('-', '_')}.py"
+    taken = {module.replace(".", "/") for module in IMPORTED.findall(own.read_text())}
+    elsewhere = sorted(module for module in taken if not module.startswith((*PLAIN, "figures/kit")))
+    return [own, *sorted((here / "kit").glob("*.py")), *(here.parent / f"{module}.py" for module in elsewhere)]

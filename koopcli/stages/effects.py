@@ -63,9 +63,8 @@ def _reason(name: str, tasks: Sequence[Task], steps: Sequence[Task]) -> str:
     used = {step.stage for step in steps} - {"plot", "sample"} | ({"sample", "test"} if samples else set())
     used |= {"vehicle", "simulate"} if plants or any(taken(type(sample)) for sample in samples) else set()
     figure = tasks[0].settings.figure if tasks[0].stage == "plot" else ""
-    kind = key.partition(".")[0]
-    if section in KINDS and "." in key and kind not in {sample.kind for sample in samples}:
-        return f"no {section} of kind '{kind}' is used"
+    if unused := _unused_kind(section, key, samples):
+        return unused
     instead = f": {FIGURES[figure].instead}" if figure and FIGURES[figure].instead else ""
     if section not in used:
         return _not_behind(section, figure, samples) + instead
@@ -78,6 +77,14 @@ def _reason(name: str, tasks: Sequence[Task], steps: Sequence[Task]) -> str:
         names = " and ".join(taken(type(samples[0])))
         return f"a sample of kind '{samples[0].kind}' takes {names} of the vehicle alone"
     return f"the figure '{figure}' draws nothing of it{instead}" if figure else "the same is made without it"
+
+
+def _unused_kind(section: str, key: str, samples: Sequence[SampleChoice]) -> str:
+    """What is said of a setting in the table of a kind that is not in effect; nothing of others."""
+    *choice, kind, _ = ["", "", *key.split(".")]
+    if section in KINDS and kind and kind not in {sample.kind for sample in samples}:
+        return f"no {section} of kind '{kind}' is used"
+    return f"the {choice[-1]} is not '{kind}'" if section not in (*KINDS, "vehicle") and choice[-1] else ""
 
 
 def _samples(section: str, steps: Sequence[Task]) -> list[SampleChoice]:

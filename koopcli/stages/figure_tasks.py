@@ -75,7 +75,7 @@ def figure(
     )
     told = {field: find(recipes, experiment, artefacts) for field, find in kind.told.items()}
     of = of_vehicles(experiment, kind.parameters) if kind.parameters else subject(artefacts, simulated)
-    about = {"figure": name, "format": image, "drawn_by": source_digest(), "of": of}
+    about = {"figure": name, "format": image, "drawn_by": source_digest(name), "of": of}
     return Task("plot", build(Plot, {**about, "series": _series(kind, artefacts, experiment, labels), **told}), inputs)
 
 

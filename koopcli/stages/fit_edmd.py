@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import fields
 
 from koopcli.checks import restored
 from koopcli.config.settings import Simulate
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import stored
-from koopcli.koopman.bases.basis import Basis
+from koopcli.koopman.bases.basis import Basis, BasisChoice
 from koopcli.koopman.bases.polynomial import Polynomials
-from koopcli.koopman.bases.thin_plate import Splines, ThinPlate
+from koopcli.koopman.bases.thin_plate import ThinPlate
 from koopcli.koopman.edmd import fit as edmd
 from koopcli.koopman.edmd.blockwise import PASSES
 from koopcli.koopman.edmd.fit import FitEdmd
@@ -86,7 +86,7 @@ def _warn_of_centres(basis: Basis, seen: Survey, context: Context) -> None:
 
 
 def _functions(task: Task) -> int:
-    return int(task.settings.basis.count(len(_plant(task).states)))
+    return int(task.settings.basis.functions(len(_plant(task).states)))
 
 
 def _terms(task: Task) -> int:
@@ -112,10 +112,9 @@ def _outlook(task: Task) -> Outlook:
 
 def _check(task: Task) -> None:
     settings, N = task.settings, _functions(task)
-    lower = "centres" if isinstance(settings.basis, Splines) else "order"
     if _terms(task) > TERMS_LIMIT:
         raise InvalidValueError(
-            f"'fit-edmd.{lower}' {getattr(settings.basis, lower)} needs {N:,} functions with {_terms(task):,} "
+            f"{_size(settings.basis)} needs {N:,} functions with {_terms(task):,} "
             f"{settings.terms.kind} terms and {size_text(8.0 * N * _terms(task))} for them; the limit is "
             f"{TERMS_LIMIT:,} terms: lower it, or choose a smaller family (--basis total, anisotropic)"
         )
@@ -137,11 +136,20 @@ def _check(task: Task) -> None:
         )
     data = [task.input(role) for role in roles_of(dict(task.inputs))]
     _check_alike(data)
-    if not isinstance(settings.basis, Splines):  # whose centres need as many different states, which only data tell
+    if not settings.basis.of_states:
         _check_samples(task, data)
     sample = task.find("sample")
     if sample is not None and isinstance(sample.settings, GridSample) and len(data) == 1:
         _check_grid(task, sample.settings)
+
+
+def _size(basis: BasisChoice) -> str:
+    """What makes a basis large, with its value."""
+    return (
+        f"'fit-edmd.{basis.sized_by}' {getattr(basis, basis.sized_by)}"
+        if basis.sized_by
+        else f"the basis '{basis.kind}'"
+    )
 
 
 def _check_alike(data: list[Task]) -> None:
@@ -179,22 +187,27 @@ def _check_grid(task: Task, grid: GridSample) -> None:
             f"'fit-edmd.{name}' {highest} is too high for {grid.count} values per state, which carry orders up to "
             f"{grid.count - 1}: lower the order or raise sample.count"
         )
-    if isinstance(settings.basis, Splines) and _functions(task) > grid.count**n_x:
+    if settings.basis.of_states and _functions(task) > grid.count**n_x:
         raise InvalidValueError(
-            f"'fit-edmd.centres' {settings.basis.centres} is too many for {grid.count**n_x:,} different states: lower "
+            f"{_size(settings.basis)} is too many for {grid.count**n_x:,} different states: lower "
             "it or raise sample.count"
         )
+
+
+def is_product(settings: FitEdmd, data: Sequence[Task]) -> bool:
+    """Whether the fit averages over the inputs of a product of states with inputs, which is read at once."""
+    sample = data[0].find("sample")
+    grid = sample is not None and isinstance(sample.settings, GridSample) and data[0].settings.steps == 1
+    return grid and len(data) == 1 and not settings.plain and settings.basis.makes.constant is not None
 
 
 def _estimate(task: Task) -> Cost:
     N, terms = _functions(task), _terms(task)
     data = [task.input(role) for role in roles_of(dict(task.inputs))]
     samples = sum(run.ancestor("sample").settings.trajectories * run.settings.steps for run in data)
-    sample, steps = data[0].ancestor("sample").settings, data[0].settings.steps
-    crossed = isinstance(sample, GridSample) and steps == 1 and task.settings.solver == "orthonormal" and len(data) == 1
-    rows = samples // (len(sample.levels) * sample.columns) if crossed else 2 * samples
-    lifting = (1e-8 * basis.centres if isinstance(basis := task.settings.basis, Splines) else 1e-6) * samples
-    return Cost(lifting + 5e-11 * rows * N * terms + 1.5e-9 * N**3, 8.0 * N * terms)
+    sample = data[0].ancestor("sample").settings
+    rows = samples // (len(sample.levels) * sample.columns) if is_product(task.settings, data) else 2 * samples
+    return Cost(task.settings.basis.seconds * samples + 5e-11 * rows * N * terms + 1.5e-9 * N**3, 8.0 * N * terms)
 
 
 def _describe(figures: Meta, settings: FitEdmd) -> str:

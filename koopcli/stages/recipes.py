@@ -10,12 +10,14 @@ from typing import get_args
 from koopcli.checks import restored
 from koopcli.config.experiment import Experiment, load_experiment
 from koopcli.config.settings import Baseline, BaselineKind, FitName, Simulate
+from koopcli.errors import InvalidValueError
 from koopcli.koopman.edmd.fit import FitEdmd
 from koopcli.koopman.eigen.fit import FitEigen
 from koopcli.records import Meta
 from koopcli.simulation.samples.point import PointSample
 from koopcli.simulation.samples.sample import SampleChoice
 from koopcli.stages.base import Task
+from koopcli.stages.fit_edmd import is_product
 from koopcli.stages.roles import as_inputs
 from koopcli.vehicles.plants import PLANTS
 
@@ -38,7 +40,10 @@ def simulation(experiment: Experiment, of: Task | None = None, plant: str = "for
 def fit_edmd(experiment: Experiment, *of: Task) -> Task:
     """The EDMD predictor, from the experiment's training set or the trajectories given."""
     trajectories = of or (simulation(experiment, plant="forces"),)
-    return Task("fit-edmd", experiment.fit_edmd, as_inputs(trajectories))
+    fit = experiment.fit_edmd
+    if is_product(fit, trajectories):
+        fit = fit.but(chunk=FitEdmd.chunk)  # which has no effect
+    return Task("fit-edmd", fit, as_inputs(trajectories))
 
 
 def fit_eigen(experiment: Experiment, of: Task | None = None) -> Task:
@@ -110,7 +115,10 @@ def evaluation(experiment: Experiment, of: Task | None = None, on: Task | None =
 
 
 def with_order(experiment: Experiment, order: int) -> Experiment:
-    """The experiment with another basis order."""
+    """The experiment with another basis order. Raises ``InvalidValueError`` for a basis without any."""
+    basis = experiment.fit_edmd.basis
+    if not hasattr(basis, "order"):
+        raise InvalidValueError(f"the basis '{basis.kind}' has no order to sweep: choose polynomials")
     return replace(experiment, fit_edmd=experiment.fit_edmd.but(order=order))
 
 

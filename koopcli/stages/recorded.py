@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from koopcli.choices import essential
 from koopcli.errors import DamagedArtefactError, InvalidValueError, NewerFormatError, UsageError
 from koopcli.stages.base import Stage, Task
 from koopcli.stages.registry import STAGES
@@ -36,8 +37,19 @@ def settings_of(record: Record) -> Any:
         raise NewerFormatError(f"{record.name} {_other_version(record)} ({error})") from error
 
 
+def all_settings(record: Record) -> dict[str, Any]:
+    """Every setting of ``record`` as JSON, also those at their defaults; what it says where they are not known here."""
+    try:
+        settings: dict[str, Any] = plain(settings_of(record))
+    except NewerFormatError:
+        return dict(record.recipe["settings"])
+    return settings
+
+
 def _other_version(record: Record) -> str:
     written, here = record.recipe["version"], STAGES[record.stage].version
+    if written == here:
+        return "holds what this koop does not know: change versions, or make it afresh"
     return (
         f"was written by another koop (version {written} of its stage, here {here}): make it afresh or change versions"
     )
@@ -49,6 +61,6 @@ def recipe_of(task: Task, inputs: Mapping[str, Record]) -> dict[str, Any]:
         "schema": SCHEMA,
         "stage": task.stage,
         "version": STAGES[task.stage].version,
-        "settings": plain(task.settings),
+        "settings": plain(essential(task.settings)),
         "inputs": {role: record.data for role, record in inputs.items()},
     }

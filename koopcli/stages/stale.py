@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from koopcli.choices import essential
 from koopcli.config.changes import flat
 from koopcli.errors import KoopError, NewerFormatError
 from koopcli.figures import source_digest
@@ -74,7 +75,8 @@ def _own_reasons(record: Record, version: int) -> Iterator[str]:
     if written != version:
         yield f"version {written} of its stage, here {version}"
     try:
-        here = dict(flat(plain(settings_of(record))))
+        settings = settings_of(record)
+        here = dict(flat(plain(essential(settings))))
     except NewerFormatError as error:
         cause = error.__cause__
         yield f"settings that are no longer known ({cause if isinstance(cause, KoopError) else 'one is missing'})"
@@ -83,7 +85,7 @@ def _own_reasons(record: Record, version: int) -> Iterator[str]:
     changed = sorted(name for name in here.keys() | recorded.keys() if not _same(here, recorded, name))
     if changed:
         yield f"settings that are written differently here: {', '.join(changed)}"
-    if "drawn_by" in here and here["drawn_by"] != source_digest():
+    if record.stage == "plot" and settings.drawn_by != source_digest(settings.figure):
         yield "drawn by other code"
 
 

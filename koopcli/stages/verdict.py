@@ -15,6 +15,7 @@ from koopcli.stages.base import Task
 from koopcli.stages.fit_edmd import OF_ONE_RUN
 from koopcli.stages.fits import LIFTED
 from koopcli.stages.lineage import lineage
+from koopcli.stages.recorded import all_settings
 from koopcli.stages.roles import roles_of
 from koopcli.store import Record, Store
 
@@ -67,7 +68,7 @@ def fitted_to_test_data(evaluation: Record, store: Store) -> bool:
 
 def _begins(part: Record, whole: Record) -> bool:
     """Whether trajectories are the first steps of others, or all of them."""
-    of_part, of_whole = part.recipe["settings"], whole.recipe["settings"]
+    of_part, of_whole = all_settings(part), all_settings(whole)
     same = all(of_part.get(name) == value for name, value in of_whole.items() if name not in OF_ONE_RUN)
     return same and part.recipe["inputs"] == whole.recipe["inputs"] and of_part["steps"] <= of_whole["steps"]
 

@@ -16,7 +16,7 @@ from koopcli.choices import written
 from koopcli.errors import InvalidValueError
 from koopcli.records import Packed
 
-SCHEMA = 1
+SCHEMA = 2
 SLAB = 1 << 24  # bytes hashed or written at a time
 
 

@@ -58,7 +58,7 @@ class Record:
     def from_json(cls, text: bytes, stage: str, key: str) -> Record:
         """The record in ``text``, verified.
 
-        Raises ``BadRecordError`` for a damaged record and ``NewerFormatError`` for one of a newer schema.
+        Raises ``BadRecordError`` for a damaged record and ``NewerFormatError`` for one of another schema.
         """
         try:
             content = parse_json(text)
@@ -72,8 +72,13 @@ class Record:
             )
         try:
             check = content.pop("check")
-            if check != _check(content) or content.pop("schema") != SCHEMA:
+            if check != _check(content):
                 raise BadRecordError
+            if content.pop("schema") != SCHEMA:
+                raise NewerFormatError(
+                    f"{stage}/{key[:SHORT]} was written by an older koop (format {schema}, this one reads {SCHEMA}): "
+                    "make it afresh in another --store, or read it by the koop that wrote it"
+                )
             record = cls(**content)
             if not _well_formed(record) or (record.stage, record.key) != (stage, key):
                 raise BadRecordError

@@ -13,6 +13,7 @@ import pytest
 from filelock import FileLock
 
 from koopcli.__main__ import main
+from koopcli.store.identity import SCHEMA
 
 BAD_VEHICLE = '[parameters]\nm = { value = -1300.0, unit = "kg" }\n'
 
@@ -359,7 +360,7 @@ def test_a_lock_that_is_held(koop, folder, monkeypatch):
 def test_a_newer_format(koop, folder):
     koop("sample")
     (record,) = (folder / "artefacts" / "records" / "sample").iterdir()
-    record.write_text(json.dumps({**json.loads(record.read_text()), "schema": 2}))
+    record.write_text(json.dumps({**json.loads(record.read_text()), "schema": SCHEMA + 1}))
     one_line(koop("sample"), 8, "update koop")
 
 
@@ -380,7 +381,7 @@ def test_a_newer_record_is_passed_over_by_ls(koop, folder):
     name = koop("sample").name
     (record,) = (folder / "artefacts" / "records" / "sample").iterdir()
     other = koop("sample", "--seed", "9").name
-    record.write_text(json.dumps({**json.loads(record.read_text()), "schema": 2}))
+    record.write_text(json.dumps({**json.loads(record.read_text()), "schema": SCHEMA + 1}))
     listed = koop("ls")
     assert listed.code == 0
     assert other in listed.out

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import tomllib
 from dataclasses import MISSING, fields, replace
 from typing import get_args, get_type_hints
@@ -154,6 +155,28 @@ def test_another_vehicle_keeps_what_the_command_line_changes():
     assert (beside.Jzz, beside.lateral.mu) == (1731.0, 0.9689)
 
 
+@pytest.mark.parametrize("plant", PLANTS.values())
+def test_the_samples_of_a_plant_are_meant_for_it(plant):
+    for section, kind in (("sample", plant.training), ("test", plant.test)):
+        assert issubclass(plant, KINDS[section][kind].meant_for)
+
+
+def test_a_choice_may_be_made_beside_its_tables():
+    for told in (
+        ["fit-edmd.basis=thin-plate", "fit-edmd.basis.thin-plate.centres=9"],
+        ["fit-edmd.basis.thin-plate.centres=9", "fit-edmd.basis=thin-plate"],
+        ["fit-edmd.basis.kind=thin-plate", "fit-edmd.centres=9"],
+    ):
+        assert load_experiment("paper", parse_set(told)).fit_edmd.basis == Splines(9)
+    for told, says in (
+        (["fit-edmd.basis.thin-plate.centres=0"], "'fit-edmd.basis.thin-plate.centres' must be at least 1"),
+        (["fit-edmd.basis.thin-plate.order=1"], "'fit-edmd.basis.thin-plate.order' belongs to basis 'tensor'"),
+        (["fit-edmd.order=3", "fit-edmd.order.x=3"], "'order' is given a value of its own as well"),
+    ):
+        with pytest.raises((UsageError, InvalidValueError), match=re.escape(says)):
+            load_experiment("paper", parse_set(told))
+
+
 def test_what_a_plant_does_not_use_is_not_in_its_key():
     vehicle = load_experiment("paper", {}).vehicle
     slippery = replace(vehicle, mu_scale=0.5, lateral=None)
@@ -216,6 +239,10 @@ def test_a_vehicle_beside_the_experiment_file(tmp_path):
         ("[vehicle]\nJzz = -1", "'vehicle.Jzz' must be above 0"),
         ("sample = 3", "must stand in a table"),
         ("[sample", "cannot read"),
+        (
+            "[fit-edmd]\nbasis = 'total'\n[fit-edmd.basis.total]\norder = 2",
+            'such as kind = "total" in [fit-edmd.basis]',
+        ),
         ("[sample]\nseed = " + "9" * 5000, "cannot read"),
         ("[sample]\nlevels = " + "[" * 3000, "cannot read"),
     ],

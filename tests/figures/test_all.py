@@ -230,8 +230,8 @@ def test_a_changed_drawing_has_another_key(monkeypatch):
     """Pictures are not compared, so the code that draws them, and what it takes numbers from, is in their recipe."""
     from koopcli import figures
 
-    code = figures.drawing_code()
-    names = {f"{path.parent.name}/{path.name}" for path in code}
+    everything = {path for name in FIGURES for path in figures.drawing_code(name)}
+    names = {f"{path.parent.name}/{path.name}" for path in everything}
     assert names >= {
         "figures/orders.py",
         "kit/style.py",
@@ -239,12 +239,17 @@ def test_a_changed_drawing_has_another_key(monkeypatch):
         "simulation/sampling.py",
         "vehicles/tyre.py",
     }
-    assert all(path.is_file() for path in code)
-    before, read = figures.source_digest.__wrapped__(), Path.read_bytes
-    assert figures.source_digest.__wrapped__() == before
-    for changed in code:
+    assert all(path.is_file() for path in everything)
+    digest, read = figures.source_digest.__wrapped__, Path.read_bytes
+    before = {name: digest(name) for name in FIGURES}
+    assert len(set(before.values())) == len(FIGURES)
+    for changed in everything:
         monkeypatch.setattr(Path, "read_bytes", lambda path, changed=changed: read(path) + b"#" * (path == changed))
-        assert figures.source_digest.__wrapped__() != before
+        moved = {name for name in FIGURES if digest(name) != before[name]}
+        assert moved == {name for name in FIGURES if changed in figures.drawing_code(name)}
+        if changed.parent.name == "figures":  # that of a figure, and of those that take from it
+            assert changed.stem.replace("_", "-") in moved
+            assert len(moved) < 5
 
 
 def test_many_lines_are_all_different():

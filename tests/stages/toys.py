@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import replace
+from dataclasses import MISSING, fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from koopcli.checks import build
+from koopcli.choices import Choice, written
+from koopcli.config.declared import every_setting
 from koopcli.config.pictures import Cone, Plot, Series, Subject, Tyres
 from koopcli.config.settings import Baseline, Evaluate, Simulate, Sweep, SweepAxis
 from koopcli.config.shipped import fingerprint
@@ -451,9 +453,46 @@ def complaint(stage: str, pins: dict[str, dict], made: Made) -> str | None:
     return None
 
 
+def defaults() -> dict[str, dict[str, object]]:
+    """The defaults of every stage's settings by their full names: what is at them is in no key."""
+    of: dict[str, dict[str, object]] = {stage: {} for stage in STAGES}
+    for setting in every_setting():
+        section, default = setting.table.partition(".")[0], setting.field.default
+        stages = {"test": ["sample"], "vehicle": ["sample", "simulate"]}.get(section, [section])
+        if default is not MISSING:
+            value = default.kind if isinstance(default, Choice) else default
+            for stage in set(stages) & set(of):
+                of[stage][setting.full_name.replace("test.", "sample.", 1)] = json.loads(json.dumps(value))
+    for cls in (Plot, Series, Subject, MagicFormula):
+        stage = "simulate" if cls is MagicFormula else "plot"
+        of[stage] |= {
+            f"{cls.__name__}.{f.name}": json.loads(json.dumps(None if f.default is MISSING else written_(f.default)))
+            for f in fields(cls)
+        }
+    return of
+
+
+def written_(value: object) -> object:
+    return written(value) if is_dataclass(value) else value
+
+
+def changed_defaults(pins: dict[str, dict], now: dict[str, dict[str, object]]) -> list[str]:
+    """The defaults that are others than those that were pinned with the same version of their stage."""
+    return [
+        f"{stage}: {name} was {default!r}: raise its version, then pin it afresh (make pins)"
+        for stage, pin in pins.items()
+        if STAGES[stage].version == pin["version"]
+        for name, default in pin["defaults"].items()
+        if now[stage].get(name, "gone") != default
+    ]
+
+
 def write_pins() -> None:
-    """Pin every stage's results beside its version."""
-    pins = {stage: {"version": STAGES[stage].version, "results": results(made(stage))} for stage in TOYS}
+    """Pin every stage's results and defaults beside its version."""
+    pins = {
+        stage: {"version": STAGES[stage].version, "defaults": defaults()[stage], "results": results(made(stage))}
+        for stage in STAGES
+    }
     PINS.write_text(json.dumps(pins, indent=1) + "\n")
 
 

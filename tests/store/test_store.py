@@ -144,6 +144,20 @@ def test_a_newer_record_is_left_alone(store):
     assert path.exists()
 
 
+def test_a_record_of_an_older_format_is_named_and_left_alone(store):
+    from koopcli.store.records import _check
+
+    record = commit(store)
+    path = store.root / "records" / "sample" / f"{record.key}.json"
+    old = {**json.loads(path.read_text()), "schema": SCHEMA - 1}
+    del old["check"]
+    path.write_text(json.dumps({**old, "check": _check(old)}))
+    before = path.read_bytes()
+    with pytest.raises(NewerFormatError, match=r"written by an older koop .* make it afresh in another --store"):
+        store.record("sample", record.key)
+    assert path.read_bytes() == before
+
+
 def failing_on(real, n, code):
     """``real``, failing on its n-th call."""
     count = 0

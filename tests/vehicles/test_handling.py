@@ -83,8 +83,10 @@ def test_derived_numbers_follow_what_is_known(vehicle):
     assert everything["substeps at 30 m/s"].value < everything["substeps at 1 m/s"].value
     bare = replace(vehicle, lateral=None, longitudinal=None)
     assert [one.name for one in derived(bare, 0.01)] == ["wheelbase", "load of a front wheel", "load of a rear wheel"]
-    assert (plants_of(vehicle), plants_of(bare)) == (["forces", "slips", "wheels"], ["forces"])
-    assert plants_of(replace(vehicle, J_R=None)) == ["forces", "slips"]
+    assert set(plants_of(vehicle)) >= {"forces", "slips", "wheels"}
+    assert "forces" in plants_of(bare)
+    assert not {"slips", "wheels"} & set(plants_of(bare))
+    assert "wheels" not in plants_of(replace(vehicle, J_R=None))
     assert len(derived(replace(vehicle, J_R=None), 0.01)) == 7
 
 

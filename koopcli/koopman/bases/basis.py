@@ -38,6 +38,10 @@ class BasisChoice(Choice):
     """
 
     makes: ClassVar[Any]
+    sized_by: ClassVar[str] = ""
+    """The setting that makes it large, if there is one."""
+    of_states: ClassVar[bool] = False
+    """Whether it needs as many different states as it has functions, which only data tell."""
 
     @property
     def name(self) -> str:
@@ -48,7 +52,12 @@ class BasisChoice(Choice):
         """The basis on the training states ``x`` (n, n_x), of ``raw`` monomials where it is one of polynomials."""
         raise NotImplementedError
 
-    def count(self, states: int) -> int:
+    @property
+    def seconds(self) -> float:
+        """About how long one state takes to be lifted."""
+        return 1e-6
+
+    def functions(self, states: int) -> int:
         """Number of observables of so many ``states``."""
         raise NotImplementedError
 

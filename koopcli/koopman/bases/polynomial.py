@@ -168,6 +168,7 @@ class Polynomials(BasisChoice):
     """Products of one polynomial for each state; the kinds differ in which products."""
 
     makes = Polynomial
+    sized_by = "order"
 
     def belongs(self, degrees: IndexArray) -> BoolArray:
         """Which products belong to the basis, (rows,), by their ``degrees`` (rows, n_x)."""
@@ -205,7 +206,7 @@ class Tensor(Polynomials):
         """All of them."""
         return np.full(len(degrees), True)
 
-    def count(self, states: int) -> int:
+    def functions(self, states: int) -> int:
         """Number of observables of so many ``states``."""
         return int((self.order + 1) ** states)
 
@@ -230,7 +231,7 @@ class Total(Polynomials):
         """Those whose degrees add up to the order at most."""
         return np.asarray(degrees.sum(axis=1) <= self.order)
 
-    def count(self, states: int) -> int:
+    def functions(self, states: int) -> int:
         """Number of observables of so many ``states``."""
         return comb(self.order + states, states)
 
@@ -256,7 +257,7 @@ class Anisotropic(Polynomials):
         """Those whose degrees of all states but the last do not add up to more."""
         return np.asarray(degrees[:, :-1].sum(axis=1) <= self.degree_velocity)
 
-    def count(self, states: int) -> int:
+    def functions(self, states: int) -> int:
         """Number of observables of so many ``states``."""
         return comb(self.degree_velocity + states - 1, states - 1) * (self.order + 1)
 

@@ -70,6 +70,6 @@ class StatesAlone(BasisChoice):
         """The basis on the training states ``x`` (n, n_x)."""
         return States(x.shape[1])
 
-    def count(self, states: int) -> int:
+    def functions(self, states: int) -> int:
         """As many as there are ``states``."""
         return states

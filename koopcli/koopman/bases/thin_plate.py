@@ -121,6 +121,7 @@ class Splines(BasisChoice):
 
     kind: ClassVar[str] = "thin-plate"
     makes = ThinPlate
+    sized_by, of_states = "centres", True
     centres: int = setting(500, low=1, high=100_000, option=True, help="number of splines")
     placement: Literal["k-means", "drawn"] = setting(
         "k-means",
@@ -135,7 +136,12 @@ class Splines(BasisChoice):
         """What an EDMD predictor with it is called."""
         return f"EDMD, {self.centres} splines"
 
-    def count(self, states: int) -> int:
+    @property
+    def seconds(self) -> float:
+        """About how long one state takes to be lifted."""
+        return 1e-8 * self.centres
+
+    def functions(self, states: int) -> int:
         """Number of observables of so many ``states``."""
         return 1 + states + self.centres
 
