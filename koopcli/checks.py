@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import sys
 import types
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from difflib import get_close_matches
-from typing import Any, Literal, Self, TypeVar, Union, get_args, get_origin
+from typing import Any, Literal, NoReturn, Self, TypeVar, Union, get_args, get_origin
 
-from koopcli.choices import Choice, Values, choices, hints_of, names_of, taken, told, without_none
+from koopcli.choices import Choice, Values, choices, hints_of, names_of, taken, told, without_none, written
 from koopcli.errors import InvalidValueError, KoopError, MisplacedError, UsageError
 
 T = TypeVar("T")
@@ -107,9 +107,9 @@ def choose(
     """The choice of one of ``kinds``, the ``usual`` one unless a layer names another, with its settings.
 
     A layer may have the name of a ``kind``, a table for a kind, in effect or not, and settings without a table, which
-    hold for the kinds that have them. ``what`` is chosen, in words; ``table``: where the tables of kinds stand within
-    the ``prefix`` of names. Raises as :func:`build`, and for a setting that
-    the kind in effect in its layer does not have.
+    hold for the kinds that have them. ``what``: the name of the choice, for messages; ``table``: where the tables of
+    kinds stand within the ``prefix`` of names. Raises as :func:`build`, and for a setting that the kind in effect in
+    its layer does not have.
     """
     check_choice(kinds, layers, usual, prefix, what, table)
     kind = chosen_kind(kinds, layers, usual)
@@ -124,8 +124,23 @@ def choose(
         of_kind = layer.values[kind] if _is_table(kind, layer.values.get(kind), kinds) else {}
         known = names_of(kinds[kind]) if i >= first else ()
         beside_it = layer.only(lambda key, value: key in known and not _is_table(key, value, kinds))  # noqa: B023
-        own.append(Layer({**of_kind, **beside_it.values}, layer.origin))
+        own.append(_together(of_kind, beside_it, prefix, f"{prefix}{table}{kind}"))
     return build_layers(kinds[kind], own, prefix, {name: (beside or {})[name] for name in taken(kinds[kind])})
+
+
+def _together(table: Mapping[str, Any], beside: Layer, prefix: str, where: str) -> Layer:
+    """The settings of a ``table`` that stands at ``where`` and of those ``beside`` it. Refuses one that is in both."""
+    values = dict(table)
+    for key, value in beside.values.items():
+        one, other = values.get(key, {}), value
+        if isinstance(one, Mapping) or isinstance(other, Mapping):
+            one, other = (part if isinstance(part, Mapping) else {"kind": part} for part in (one, other))
+            values[key] = _together(one, Layer(other, beside.origin), prefix, f"{where}.{key}").values if one else value
+        else:
+            raise beside.origin.misnamed(
+                beside.origin.say(f"'{prefix}{key}' is set twice, as such and in the table '{where}': leave one out")
+            )
+    return Layer(values, beside.origin)
 
 
 def check_choice(
@@ -146,14 +161,15 @@ def check_choice(
         tables = [key for key, value in layer.values.items() if isinstance(value, Mapping) and not _any_has(kinds, key)]
         for name in [*([] if kind is None else [kind]), *tables]:
             if not isinstance(name, str) or name not in kinds:
-                raise layer.origin.misnamed(
-                    layer.origin.say(f"unknown kind of {what} {_short(repr(name))}{candidates(str(name), kinds)}")
-                )
+                where, tail = f"{prefix}{table}".rstrip("."), candidates(str(name), kinds)
+                raise layer.origin.misnamed(layer.origin.say(f"'{where}' has no kind {_short(repr(name))}{tail}"))
         for key, value in layer.values.items():
             if _is_table(key, value, kinds):
                 for name in value:
                     _check_owner(kinds, key, name, layer.origin, f"{prefix}{table}{key}.", what)
                 _checked(kinds[key], [Layer(value, layer.origin)], f"{prefix}{table}{key}.")
+            elif key in kinds and not any(key in names_of(cls) for cls in kinds.values()):
+                raise InvalidValueError(layer.origin.say(_no_table(f"{prefix}{table}{key}", value)))
             elif kind is None:
                 _check_any(kinds, Layer({key: value}, layer.origin), prefix)
             elif key != "kind":
@@ -167,6 +183,9 @@ def check_choice(
 def _check_any(kinds: Mapping[str, type[Choice]], layer: Layer, prefix: str) -> None:
     """Refuse a setting that none of the kinds takes, where it is not known which one is in effect."""
     (key,) = layer.values
+    every = [name for cls in kinds.values() for name in (*names_of(cls), *taken(cls))]
+    if key != "kind" and key not in every:
+        _refuse_unknown(key, dict.fromkeys(name for cls in kinds.values() for name in names_of(cls)), layer, prefix)
     refused = []
     for cls in [cls for cls in kinds.values() if key in names_of(cls)] or kinds.values():
         try:
@@ -205,9 +224,7 @@ def _checked(cls: type, layers: Sequence[Layer], prefix: str) -> Values:
             if key in taken(cls):
                 raise layer.origin.misnamed(layer.origin.say(_elsewhere(f"{prefix}{key}", key, taken(cls)[key])))
             if key not in _own(cls) and key not in names_of(cls):
-                raise layer.origin.misnamed(
-                    layer.origin.say(f"unknown setting '{prefix}{key}'{candidates(key, names_of(cls))}")
-                )
+                _refuse_unknown(key, names_of(cls), layer, prefix)
     values: Values = {}
     for f in fields(cls):
         if f.name in choices(cls):
@@ -226,16 +243,25 @@ def _checked_choice(cls: type, name: str, layers: Sequence[Layer], prefix: str) 
     of_kinds = {key for kind in kinds.values() for key in names_of(kind)}
     own = []
     for layer in layers:
-        given = layer.values.get(name, {})
-        if isinstance(given, Choice):
-            return {name: given}
-        table = given if isinstance(given, Mapping) else {"kind": given}
-        beside = {key: value for key, value in layer.values.items() if key in of_kinds and key not in _own(cls)}
-        own.append(Layer({**table, **beside}, layer.origin))
+        table = _table_of(layer.values.get(name), choices(cls)[name])
+        beside = layer.only(lambda key, value: key in of_kinds and key not in _own(cls))
+        own.append(_together(table, beside, prefix, f"{prefix}{name}"))
     if default is None and not any("kind" in layer.values for layer in own):
         check_choice(kinds, own, None, prefix, name, f"{name}.")
         return {}
     return {name: choose(kinds, own, getattr(default, "kind", None), prefix, name, table=f"{name}.")}
+
+
+def _table_of(given: Any, base: type[Choice]) -> Mapping[str, Any]:
+    """The table of a choice, which may be given by the name of its kind or as an instance."""
+    if isinstance(given, base):
+        values = written(given)
+        return {"kind": values.pop("kind"), given.kind: values}
+    return given if isinstance(given, Mapping) else {} if given is None else {"kind": given}
+
+
+def _refuse_unknown(key: str, known: Iterable[str], layer: Layer, prefix: str) -> NoReturn:
+    raise layer.origin.misnamed(layer.origin.say(f"unknown setting '{prefix}{key}'{candidates(key, known)}"))
 
 
 def _own(cls: type) -> set[str]:
@@ -255,7 +281,7 @@ def coerce(kind: Any, value: object, name: str, bounds: Mapping[str, Any], origi
             return build(kind, value, origin, f"{name}.")
         if type(value) is kind:
             return value
-        raise InvalidValueError(origin.say(f"'{name}' must be a table of settings, got {_short(repr(value))}"))
+        raise InvalidValueError(origin.say(_no_table(name, value)))
     if get_origin(kind) is Literal:
         return _choice(get_args(kind), value, name, origin)
     if get_origin(kind) in (Union, types.UnionType):
@@ -306,6 +332,10 @@ def _number(kind: Any, value: object, name: str, origin: Origin) -> Any:
     if not isinstance(value, kind):
         raise wrong
     return value
+
+
+def _no_table(name: str, value: object) -> str:
+    return f"'{name}' must be a table of settings, got {_short(repr(value))}"
 
 
 def _short(text: str) -> str:

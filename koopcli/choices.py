@@ -30,8 +30,10 @@ def setting(
     """A dataclass field with its documentation and bounds: ``low <= value``, ``above < value``, ``value <= high``.
 
     ``unique``: a list without repetition; ``empty``: a list that may have no entry; ``option``: the command of these
-    settings has an option for it.
+    settings has an option for it. The default of a choice is a kind with its own defaults.
     """
+    if isinstance(default, Choice) and default != type(default)():
+        raise TypeError(f"the default {default} is not a kind with its own defaults")
     meta = {"help": help, "low": low, "above": above, "high": high, "unit": unit, "unique": unique, "empty": empty}
     meta["option"] = option
     return field(metadata=meta) if default is MISSING else field(default=default, metadata=meta)

@@ -159,6 +159,14 @@ def test_a_setting_stands_beside_the_choice_that_has_it():
         (({"kind": "box", "corner": {"kind": "round", "round": {"radius": 5}}},), Box(corner=Round(5.0), owner="me")),
         (({"kind": "box", "corner": "round", "radius": 5}, {"corner": "sharp"}), Box(owner="me")),
         (({"kind": "box", "corner": "round"}, {"kind": "ball"}), Ball()),  # what only the other kind had is left
+        (  # the kind stands by its name, its settings in a table of a table
+            ({"kind": "box", "corner": "round", "box": {"corner": {"round": {"radius": 5}}}},),
+            Box(corner=Round(5.0), owner="me"),
+        ),
+        (
+            ({"kind": "box", "box": {"corner": "round"}, "corner": {"round": {"radius": 5}}},),
+            Box(corner=Round(5.0), owner="me"),
+        ),
     ],
 )
 def test_later_layers_win(layers, made):
@@ -183,10 +191,16 @@ def test_a_copy_keeps_what_both_kinds_have_and_is_not_at_its_default():
         (({"corner": "round"},), MisplacedError, "'thing.corner' belongs to shape 'box', and this shape is 'ball'"),
         (({"kind": "box", "radius": 3},), MisplacedError, "'thing.radius' belongs to corner 'round', and this corner"),
         (({"ball": {"corner": "round"}},), MisplacedError, "'thing.ball.corner' belongs to shape 'box'"),
-        (({"kind": "boll"},), UsageError, "unknown kind of shape 'boll': did you mean 'ball'"),
-        (({"kind": ["ball"]},), UsageError, "unknown kind of shape"),
-        (({"bix": {"size": 1}},), UsageError, "unknown kind of shape 'bix': did you mean 'box'"),
+        (({"kind": "boll"},), UsageError, "'thing' has no kind 'boll': did you mean 'ball'"),
+        (({"kind": ["ball"]},), UsageError, "'thing' has no kind"),
+        (({"bix": {"size": 1}},), UsageError, "'thing' has no kind 'bix': did you mean 'box'"),
         (({"sise": 3},), UsageError, "unknown setting 'thing.sise': did you mean 'size'"),
+        (({"ball": 3},), InvalidValueError, "'thing.ball' must be a table of settings, got 3"),
+        (
+            ({"ball": {"size": 3}, "size": 4},),
+            UsageError,
+            "'thing.size' is set twice, as such and in the table 'thing.ball'",
+        ),
         (({"box": {"size": 0}},), InvalidValueError, "'thing.box.size' must be above 0"),
         (({"size": 0}, {"size": 1}), InvalidValueError, "'thing.size' must be above 0"),
         (({"kind": "box", "owner": "you"},), UsageError, "'thing.owner' is the simulation's: set person.owner"),
@@ -205,6 +219,34 @@ def test_where_the_kind_is_not_known_yet_any_kind_may_have_a_setting():
     for values in ({"sise": 3}, {"size": 0}, {"corner": "flat"}):
         with pytest.raises(KoopError):
             check_choice(OF_SHAPES, [Layer(values)], None, "thing.", "shape")
+
+
+def test_near_names_come_from_all_kinds_while_none_is_known():
+    with pytest.raises(
+        UsageError, match=re.escape("'thing.cornr': did you mean 'corner'? (known: size, corner, radius)")
+    ):
+        check_choice(OF_SHAPES, [Layer({"cornr": 1})], None, "thing.", "shape")
+
+
+def test_an_instance_stands_for_its_kind_with_all_its_settings():
+    assert Thing.of(shape=Ball(4.0)).but(shape=Ball()) == Thing()
+    for values in ({"shape": Ball(4.0), "size": 5}, {"shape": Sharp()}):
+        with pytest.raises(UsageError):
+            Thing.of(**values)
+
+
+def test_the_default_of_a_choice_has_its_own_defaults():
+    with pytest.raises(TypeError, match="its own defaults"):
+        setting(Ball(2.0))
+
+
+def test_a_choice_left_open_is_restored():
+    @dataclass(frozen=True)
+    class Open:
+        shape: Shape | None = setting(None)
+
+    globals()["Open"] = Open  # where type hints are looked up
+    assert restored(Open, written(Open())) == Open()
 
 
 @given(st.sampled_from(["ball", "box"]), st.floats(0.1, 10), st.none() | st.floats(0.1, 10))

@@ -43,14 +43,17 @@ def complete_figure(incomplete: str) -> list[str]:
 def complete_setting(incomplete: str) -> list[str]:
     """Settings by the names that hold for the kind in effect, or for the kind that is named, then their values."""
     from koopcli.cli.derived import values_of
-    from koopcli.config.declared import every_setting
+    from koopcli.config.declared import entries, every_setting
 
     settings = list(every_setting())
     name, equals, _ = incomplete.partition("=")
     if equals:
-        values = [value for one in settings if name in (one.short_name, one.full_name) for value in values_of(one.hint)]
+        named = [setting for setting in settings if name in (setting.short_name, setting.full_name)]
+        values = [value for setting in named for value in values_of(setting.hint)]
         return _beginning(dict.fromkeys(f"{name}={value}" for value in values), incomplete)
-    short, full = ([f"{getattr(one, which)}=" for one in settings] for which in ("short_name", "full_name"))
+    short = [f"{setting.short_name}=" for setting in settings]
+    full = [f"{setting.full_name}=" for setting in settings]
+    full += [f"{setting.full_name}.{entry}=" for setting in settings for entry in entries(setting)]
     return _beginning(dict.fromkeys([*short, "vehicle.name="]), incomplete) or _beginning(full, incomplete)
 
 

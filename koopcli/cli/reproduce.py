@@ -23,7 +23,7 @@ from koopcli.cli.options import (
     StoreOption,
     WorkersOption,
 )
-from koopcli.config.changes import SECTIONS, flat
+from koopcli.config.changes import SECTIONS, flat, short_name
 from koopcli.config.experiment import Experiment, load_experiment
 from koopcli.console import show_table
 from koopcli.errors import KoopError, UsageError
@@ -144,8 +144,8 @@ def _refuse(call: Invocation, chosen: Sequence[Method]) -> None:
         if name in NOT_HERE:
             raise UsageError(f"reproduce has its own {name}: change it in the stages' own commands")
         for method in chosen:
-            if name in method.fixed:
-                raise UsageError(f"reproduce sweeps {name}: choose what it sweeps with --set '{method.fixed[name]}'")
+            if instead := method.fixed.get(short_name(name)):
+                raise UsageError(f"reproduce sweeps {name}: choose what it sweeps with --set '{instead}'")
         section, _, key = name.partition(".")
         if (
             len({method.name for method in chosen} - {"beyond"}) > 1

@@ -42,8 +42,16 @@ def parse_set(assignments: Sequence[str]) -> Changes:
             )
         if section not in SECTIONS:
             raise UsageError(f"--set {text}: unknown stage '{section}'{candidates(section, SECTIONS)}")
-        given.append((name.strip(), toml_value(raw)))
+        value = toml_value(raw)
+        if _is_empty(value):
+            raise InvalidValueError(f"--set {text}: a table without settings changes nothing")
+        given.append((name.strip(), value))
     return nested(given)
+
+
+def _is_empty(value: object) -> bool:
+    """Whether a value is a table without any setting, or has one in it."""
+    return isinstance(value, dict) and (not value or any(map(_is_empty, value.values())))
 
 
 def nested(named: Iterable[tuple[str, Any]]) -> Changes:
@@ -75,12 +83,23 @@ def _kind(name: str, key: str, value: Any) -> Any:
 
 
 def flat(changes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Every changed setting by its full name, such as ``vehicle.lateral.mu``, with its raw value."""
+    """Every changed setting by its full name, such as ``vehicle.lateral.mu``, with its raw value.
+
+    The kind in the table of a choice, ``fit-edmd.basis.kind``, is the choice ``fit-edmd.basis``.
+    """
     for key, value in changes.items():
         if isinstance(value, Mapping):
             yield from flat(value, f"{prefix}{key}.")
+        elif key == "kind" and prefix.count(".") > 1:
+            yield prefix.removesuffix("."), value
         else:
             yield f"{prefix}{key}", value
+
+
+def short_name(name: str) -> str:
+    """The name of a setting for the kind in effect, such as ``fit-edmd.order`` of ``fit-edmd.basis.tensor.order``."""
+    section, *keys = name.split(".")
+    return name if section in ("vehicle", "sample", "test") else f"{section}.{keys[-1]}"
 
 
 def toml_value(text: str) -> object:

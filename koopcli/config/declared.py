@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import Field, fields
+from dataclasses import Field, fields, is_dataclass
 from typing import Any, NamedTuple
 
 from koopcli.choices import Choice, choices, hints_of, without_none
@@ -69,6 +69,12 @@ def _of(table: str, cls: type[Any]) -> Iterator[Declared]:
         if f.name in choices(cls):
             for name, kind in choices(cls)[f.name].kinds().items():
                 yield from _of(f"{table}.{f.name}.{name}", kind)
+
+
+def entries(setting: Declared) -> list[str]:
+    """The names in the table that a setting is, such as ``mu`` of ``vehicle.lateral``; none of one that is a value."""
+    bare = without_none(setting.hint)
+    return [f.name for f in fields(bare)] if is_dataclass(bare) else []
 
 
 def is_choice(name: str) -> bool:

@@ -77,8 +77,8 @@ class Experiment:
         return Path(str(next((name for name in reversed(named) if name), DEFAULT_VEHICLE))).stem
 
     def before_naming(self) -> Experiment | None:
-        """The experiment without the last name of a vehicle; None where there is none, or what is changed of the
-        vehicle needs it.
+        """The experiment without the last name of a vehicle; None if it names none, or changes a parameter that only
+        the named vehicle has.
         """
         named = [i for i, layer in enumerate(self.sources) if "name" in layer.values.get("vehicle", {})]
         if not named:
@@ -111,23 +111,27 @@ class Experiment:
 
     def sample(self, usual: str) -> SampleChoice:
         """The training sample, of the ``usual`` kind unless the experiment names one."""
-        return self._sampled("sample", usual, self.vehicle)
+        return self.sampled("sample", usual)
 
     def test(self, usual: str, vehicle: VehicleParameters) -> SampleChoice:
         """The test sample of a ``vehicle``, of the ``usual`` kind unless the experiment names one."""
-        return self._sampled("test", usual, vehicle)
+        return self.sampled("test", usual, vehicle)
 
     def tabled(self, kind: str, section: str = "test") -> SampleChoice:
         """The sample of a ``kind``, from its tables alone, whichever kind is in effect."""
-        return self._sampled(section, kind, self.vehicle, tables=True)
+        return self.sampled(section, kind, tables=True)
 
-    def _sampled(self, section: str, usual: str, vehicle: VehicleParameters, *, tables: bool = False) -> SampleChoice:
+    def sampled(
+        self, section: str, usual: str, vehicle: VehicleParameters | None = None, *, tables: bool = False
+    ) -> SampleChoice:
+        """The sample of a ``section``, of the ``usual`` kind unless the experiment names one."""
         layers = [source.section(section) for source in self.sources]
         if tables:
             layers = [layer.only(lambda key, value: isinstance(value, Mapping)) for layer in layers]
         kinds = KINDS[section]
         kind = kinds[chosen_kind(kinds, layers, usual)]
         plant = self.plant_for(kind.meant_for)
+        vehicle = vehicle or self.vehicle
         values = {**vars(vehicle), **written(plant), "vehicle": plant.used(vehicle), "dt": self.simulate.dt}
         beside = {name: values[name] for name in taken(kind)}
         sample: SampleChoice = choose(kinds, layers, usual, f"{section}.", section, beside)
@@ -148,24 +152,13 @@ class Experiment:
         layers = [source.section(section) for source in self.sources]
         return build_layers(DECLARED[section], [*layers, Layer(chosen)], f"{section}.")
 
-    def value(self, name: str, sample: str = "") -> object:
-        """The value of a setting by its full ``name``, of samples without a table that of the kind ``sample``."""
-        section, *keys = name.split(".")
-        if section == "vehicle":
-            value: Any = self.vehicle
-            for key in keys:
-                value = getattr(value, key, None)
-            return value
-        if section in KINDS:
-            own = self.tabled(keys[0], section) if len(keys) > 1 else self._sampled(section, sample, self.vehicle)
-            return written(own).get(keys[-1])
-        if section == "simulate" and self.simulate.plant is None and keys[-1] not in written(self.simulate):
-            return [written(self.plant_for(kind)).get(keys[-1]) for kind in PlantChoice.kinds().values()]
-        name = keys[-2] if keys[-1] == "kind" and len(keys) > 1 else keys[-1]
-        beside = {needed: getattr(self, needed) for needed in taken(DECLARED[section])}
-        chosen = Layer(dict(zip(keys[:-1:2], keys[1:-1:2], strict=False)))
-        layers = [*(source.section(section) for source in self.sources), chosen]
-        return written(build_layers(DECLARED[section], layers, beside=beside)).get(name)
+    def given(self, name: str) -> object:
+        """The raw value that the command line gives a setting by its full ``name``."""
+        return dict(flat(self.sources[-1].values))[name]
+
+    def settings(self, section: str) -> Any:
+        """The settings of a ``section``, but for those of samples."""
+        return self.about if section == "experiment" else getattr(self, section.replace("-", "_"))
 
     def without(self, name: str) -> Experiment:
         """The experiment without a change of the command line."""

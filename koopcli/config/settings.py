@@ -1,6 +1,5 @@
-"""The settings of every stage: frozen, typed, bounded, with the paper's values as defaults.
+"""Settings of the stages that have no file of their own, with the paper's values as defaults.
 
-The allowed names are literals, so that `koop --help` needs no numerics; a test holds them equal to the registries.
 A stage's settings are part of its key. Whatever does not change a result is not in here; the size of a chunk is here,
 because it moves the last bits of a score and says which rows a committed part holds. ``settled`` resets settings that
 have no effect, so that they are not in the key.

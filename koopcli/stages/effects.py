@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from typing import Any, get_args
 
-from koopcli.choices import taken, written
-from koopcli.config.declared import KINDS
+from koopcli.choices import Choice, taken, written
+from koopcli.config.declared import KINDS, is_choice
 from koopcli.config.experiment import Experiment
+from koopcli.config.settings import FitName
 from koopcli.errors import KoopError
 from koopcli.figures.kit.registry import FIGURES
 from koopcli.simulation.samples.sample import SampleChoice
@@ -18,8 +21,8 @@ Plan = Callable[[Experiment], Sequence[Task]]
 def why_idle(name: str, experiment: Experiment, plan: Plan, tasks: Sequence[Task]) -> str | None:
     """Why the change ``name`` of the command line has no effect on the ``tasks`` that ``plan`` makes of the experiment.
 
-    It has none where the same tasks are planned without it. None where it has one, where its value is the one that is
-    in effect anyway, and for the name of a vehicle, of which another may make the same.
+    It has none where the same tasks are planned without it. Returns None if it has one, if its value is in effect
+    anyway, or if it names a vehicle, since two vehicles may make the same.
     """
     if name == "vehicle.name":
         return None
@@ -36,24 +39,41 @@ def why_idle(name: str, experiment: Experiment, plan: Plan, tasks: Sequence[Task
 def _in_effect(name: str, experiment: Experiment, other: Experiment, steps: Sequence[Task]) -> bool:
     """Whether the value of the change is that of the experiment without it, or of what is made."""
     section, _, key = name.partition(".")
+    raw = experiment.given(name)
+    if section == "vehicle":
+        return experiment.vehicle == other.vehicle
+    if name == "experiment.fit":
+        return {step.stage for step in steps} & set(get_args(FitName)) == {raw}
     if section in KINDS:
-        kinds = {step.settings.kind for step in steps if step.stage == "sample"} & set(KINDS[section])
-        given = [(kind, experiment.value(name, kind)) for kind in sorted(kinds) if _has(experiment, name, kind)]
-        if any(value == other.value(name, kind) for kind, value in given):
-            return True
-        made = [written(step.settings) for step in steps if step.stage == "sample"]
-        return any(one["kind"] == kind and one.get(key) == value for one in made for kind, value in given)
-    value = experiment.value(name)
-    last, made = key.rpartition(".")[2], [written(step.settings) for step in steps if step.stage == section]
-    return value == other.value(name) or (bool(made) and all(last in one and one[last] == value for one in made))
+        used = _samples(section, steps)
+        unchanged = list(_unchanged(other, section, used))
+    else:
+        used, unchanged = [step.settings for step in steps if step.stage == section], [other.settings(section)]
+    made = [value for settings in used for value in _values(settings, key)]
+    return any(_is(raw, value) for settings in unchanged for value in _values(settings, key)) or (
+        bool(made) and all(_is(raw, value) for value in made)
+    )
 
 
-def _has(experiment: Experiment, name: str, kind: str) -> bool:
-    try:
-        experiment.value(name, kind)
-    except KoopError:
-        return False
-    return True
+def _unchanged(other: Experiment, section: str, used: Sequence[SampleChoice]) -> Iterator[SampleChoice]:
+    """Samples of the kinds that are ``used``, as another experiment has them."""
+    for sample in used:
+        if sample.kind in KINDS[section]:
+            with suppress(KoopError):
+                yield other.sampled(section, sample.kind)
+
+
+def _values(settings: Any, key: str) -> list[object]:
+    """The value of a setting, by its name or in the table of a kind; none where the kind is another."""
+    *path, name = [*(["kind"] if isinstance(settings, Choice) and "." in key else []), *key.split(".")]
+    values = written(settings)
+    kinds = dict(zip(path[::2], path[1::2], strict=True))
+    return [values[name]] if name in values and kinds.items() <= values.items() else []
+
+
+def _is(raw: object, value: object) -> bool:
+    """Whether a ``raw`` value stands for the ``value`` of a setting."""
+    return value in (tuple(raw) if isinstance(raw, list) else raw, (raw,))
 
 
 def _reason(name: str, tasks: Sequence[Task], steps: Sequence[Task]) -> str:
@@ -63,8 +83,9 @@ def _reason(name: str, tasks: Sequence[Task], steps: Sequence[Task]) -> str:
     used = {step.stage for step in steps} - {"plot", "sample"} | ({"sample", "test"} if samples else set())
     used |= {"vehicle", "simulate"} if plants or any(taken(type(sample)) for sample in samples) else set()
     figure = tasks[0].settings.figure if tasks[0].stage == "plot" else ""
-    if unused := _unused_kind(section, key, samples):
-        return unused
+    own = samples if section in KINDS else [step.settings for step in steps if step.stage == section]
+    if of_choice := _unused_kind(section, key, own) or _chosen(section, key, own):
+        return of_choice
     instead = f": {FIGURES[figure].instead}" if figure and FIGURES[figure].instead else ""
     if section not in used:
         return _not_behind(section, figure, samples) + instead
@@ -79,12 +100,19 @@ def _reason(name: str, tasks: Sequence[Task], steps: Sequence[Task]) -> str:
     return f"the figure '{figure}' draws nothing of it{instead}" if figure else "the same is made without it"
 
 
-def _unused_kind(section: str, key: str, samples: Sequence[SampleChoice]) -> str:
-    """What is said of a setting in the table of a kind that is not in effect; nothing of others."""
+def _unused_kind(section: str, key: str, used: Sequence[Any]) -> str:
+    """What is said of a setting in the table of a kind that none of the settings ``used`` has; nothing of others."""
     *choice, kind, _ = ["", "", *key.split(".")]
-    if section in KINDS and kind and kind not in {sample.kind for sample in samples}:
-        return f"no {section} of kind '{kind}' is used"
-    return f"the {choice[-1]} is not '{kind}'" if section not in (*KINDS, "vehicle") and choice[-1] else ""
+    if section == "vehicle" or not kind or any(_values(settings, key) for settings in used):
+        return ""
+    return f"no {section} of kind '{kind}' is used" if section in KINDS else f"the {choice[-1]} is not '{kind}'"
+
+
+def _chosen(section: str, key: str, used: Sequence[Any]) -> str:
+    """What is said of a choice that is made otherwise; nothing of other settings."""
+    name = key.rpartition(".")[2]
+    made = [value for settings in used for value in _values(settings, key)]
+    return f"the {name} is '{made[0]}' in any case" if section != "vehicle" and made and is_choice(name) else ""
 
 
 def _samples(section: str, steps: Sequence[Task]) -> list[SampleChoice]:

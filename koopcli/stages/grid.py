@@ -22,7 +22,7 @@ from koopcli.stages.effects import why_idle
 @dataclass(frozen=True)
 class Cell:
     """One cell: its ``place`` on each axis, -1 where that has no effect, its evaluation, and why that is refused.
-    ``same``: places that come to the same though every setting has an effect there.
+    ``same``: other places with the same evaluation.
     """
 
     place: tuple[int, ...]

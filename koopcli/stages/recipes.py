@@ -65,9 +65,6 @@ METHODS: dict[str, Callable[[Experiment], Task]] = {
 }
 
 
-CHOSEN = ("experiment.fit",)  # what chooses the method where none is named
-
-
 def predictor(experiment: Experiment, usual: FitName = "fit-edmd") -> Task:
     """The predictor that the experiment is about, of the ``usual`` fit where it does not say which."""
     return METHODS[experiment.about.fit or usual](experiment)

@@ -55,7 +55,7 @@ def one_line(result, code, *parts):
         (["simulate", "--set", "simulate.dt=1" + "0" * 400], 3, "'simulate.dt' must be a finite number"),
         (["sample", "--set", "sample.seed=" + "9" * 5000], 3, "'sample.seed' must be a whole number"),
         (["sample", "--set", "sample.levels=" + "[" * 3000], 3, "nested over 64 levels deep"),
-        (["sample", "--set", "sample.kind=[1]"], 2, "unknown kind of sample [1]"),
+        (["sample", "--set", "sample.kind=[1]"], 2, "'sample' has no kind [1]"),
         (["sample", "--set", "sample.levels=[1e308]"], 3, "'sample.levels[0]' must be at most 1e+12"),
         (["sample", "box", "--count", "100000000"], 3, "the sample would need"),
         (["simulate", "--set", "sample.count=2000"], 3, "the trajectories would need"),

@@ -197,7 +197,11 @@ def test_a_dry_run_makes_nothing(koop, folder):
         ((), 2, "what is swept?"),
         (("--set", "fit-edmd.order=2"), 2, "what is swept?"),
         (("--set", "fit-edmd.ordr=1:2"), 2, "did you mean 'order'"),
-        (("--set", "fit-edmd.terms=linear,bilinaer"), 2, "unknown kind of terms 'bilinaer': did you mean 'bilinear'"),
+        (
+            ("--set", "fit-edmd.terms=linear,bilinaer"),
+            2,
+            "'fit-edmd.terms' has no kind 'bilinaer': did you mean 'bilinear'",
+        ),
         (("--set", "fit-edmd.order=0:2"), 3, "at least 1, got 0"),
         (("--set", "fit-edmd.order=2:1"), 3, "both ends included"),
         (("--set", "fit-eigen.degree=1:2"), 2, "changes nothing here"),
