@@ -20,11 +20,17 @@ BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
 IndexArray = npt.NDArray[np.intp]
 Meta = dict[str, Any]  # what JSON can hold
+CHANNELS = ("state", "input", "constant_and_input")  # axes whose entries may have units of their own
+OF_STATES = "of states"  # the units of what does not know its states, until it is packed with what does
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Array(Content):
-    """Values with one name per axis and the unit (or one unit per column of the last axis)."""
+    """Values with a name for every axis, such as ``training_state``, and their unit.
+
+    ``units`` may list several, separated by commas: one for each entry of the one axis that is among ``CHANNELS``.
+    Within a group of a file an axis of one name has one length.
+    """
 
     values: Blocks
     axes: tuple[str, ...]
@@ -139,7 +145,7 @@ class Sample(Content):
         }
         if not self.factors:
             arrays["states"] = Array(self.states, ("trajectory", "state"), self.state_channels.unit_text)
-        arrays["inputs"] = Array(self.inputs, ("input row", "step", "input"), self.input_channels.unit_text)
+        arrays["inputs"] = Array(self.inputs, ("input_row", "step", "input"), self.input_channels.unit_text)
         meta = {
             "crossed": self.crossed,
             "state_channels": self.state_channels.pack(),

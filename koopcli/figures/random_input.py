@@ -69,9 +69,9 @@ def numbers(shown: RandomInput) -> Mapping[str, Array]:
     return {
         "time": column(shown.time, "sample", "s"),
         **state_columns(shown.true, shown.channels, "sample", "{}/true"),
-        "segment": column(np.repeat(np.arange(len(lengths)), lengths), "predicted sample", "1"),
-        "segment time": column(time, "predicted sample", "s"),
-        **state_columns(joined, shown.channels, "predicted sample", "{}/predicted"),
+        "segment": column(np.repeat(np.arange(len(lengths)), lengths), "predicted_sample", "1"),
+        "segment time": column(time, "predicted_sample", "s"),
+        **state_columns(joined, shown.channels, "predicted_sample", "{}/predicted"),
         "segment rmse": column(shown.rmse, "segment", "%"),
     }
 

@@ -64,8 +64,8 @@ def numbers(shown: Sequence[Arrow]) -> Mapping[str, Array]:
     for arrow in shown:
         ends = np.array([arrow.tail, arrow.head])
         name = arrow.name.translate({ord(sign): None for sign in "${},"})
-        columns[f"{name}/x"] = column(ends[:, 0], "tail and head", "m")
-        columns[f"{name}/y"] = column(ends[:, 1], "tail and head", "m")
+        columns[f"{name}/x"] = column(ends[:, 0], "tail_and_head", "m")
+        columns[f"{name}/y"] = column(ends[:, 1], "tail_and_head", "m")
     return columns
 
 

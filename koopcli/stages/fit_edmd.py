@@ -217,7 +217,7 @@ def _describe(figures: Meta, settings: FitEdmd) -> str:
 
 STAGE = Stage(
     name="fit-edmd",
-    version=6,
+    version=7,
     settings=lambda values: restored(FitEdmd, values),
     run=_run,
     unpack=stored.predictor,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from typing import Any, Literal, get_args
 
@@ -134,7 +134,21 @@ def drawing(settings: Plot, inputs: Mapping[str, Any], version: str = "") -> Dra
     module = module_of(settings.figure)
     shown = module.select(sources_of(settings, inputs), settings)
     image = style.render(module.draw(shown), settings.format, signature(settings.of, version))
-    return Drawing(settings.figure, settings.format, module.numbers(shown), image)
+    return Drawing(settings.figure, settings.format, _apart(module.numbers(shown)), image)
+
+
+def _apart(numbers: Mapping[str, Array]) -> dict[str, Array]:
+    """The columns, with axes of different lengths told apart where a group has them under one name."""
+    lengths: dict[tuple[str, str], list[int]] = {}
+    columns = {}
+    for name, array in numbers.items():
+        (axis,), (length,) = array.axes, array.values.shape
+        known = lengths.setdefault((name.rpartition("/")[0], axis), [])
+        if length not in known:
+            known.append(length)
+        number = known.index(length) + 1
+        columns[name] = replace(array, axes=(axis if number == 1 else f"{axis}_{number}",))
+    return columns
 
 
 def column(values: npt.ArrayLike, axis: str, unit: str) -> Array:

@@ -35,10 +35,9 @@ class OrthonormalPolynomials(Content):
         return self.centre + self.scale * float(self.alpha[0]), self.scale * float(self.beta[1])
 
     def pack(self) -> dict[str, Array]:
-        """The map to [-1, 1] and the recurrence coefficients."""
+        """The recurrence coefficients."""
         return {
-            "map": Array(np.array([self.centre, self.scale]), ("centre and scale",), "that of the state"),
-            "alpha": Array(self.alpha, ("degree",), "1"),
+            "alpha": Array(self.alpha, ("recurrence",), "1"),
             "beta": Array(self.beta, ("degree",), "1"),
         }
 
@@ -61,6 +60,7 @@ class Monomials:
 
     degree: int
 
+    centre, scale = 0.0, 1.0
     linear = (0.0, 1.0)
 
     def pack(self) -> dict[str, Array]:

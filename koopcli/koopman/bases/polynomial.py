@@ -17,11 +17,19 @@ from koopcli.koopman.bases.basis import BasisChoice
 from koopcli.koopman.bases.moments import Products, products_of
 from koopcli.koopman.bases.orthonormal import Monomials, OrthonormalPolynomials, orthonormal_polynomials
 from koopcli.koopman.predictor.lifts import Observed
-from koopcli.records import Array, BoolArray, FloatArray, IndexArray, Packed
+from koopcli.records import OF_STATES, Array, BoolArray, FloatArray, IndexArray, Packed
 
 
 class Axis(Protocol):
     """Polynomials p_0 = 1, p_1, … of one state."""
+
+    @property
+    def centre(self) -> float:
+        """The t that is mapped to zero."""
+
+    @property
+    def scale(self) -> float:
+        """How far from there the t is that is mapped to one."""
 
     @property
     def degree(self) -> int:
@@ -132,8 +140,12 @@ class Polynomial(Content):
         return head, None if np.array_equal(choice, np.arange(every)) else choice
 
     def pack(self) -> Packed:
-        """The degrees, and the recurrence coefficients of each factor."""
-        arrays = {"degrees": Array(self.degrees, ("function", "state"), "1")}
+        """The degrees, how each state is mapped to [-1, 1], and the recurrence coefficients of its polynomials."""
+        arrays = {
+            "degrees": Array(self.degrees, ("function", "state"), "1"),
+            "centre": Array(np.array([axis.centre for axis in self.axes]), ("state",), OF_STATES),
+            "scale": Array(np.array([axis.scale for axis in self.axes]), ("state",), OF_STATES),
+        }
         for i, axis in enumerate(self.axes):
             arrays |= {f"{i}/{name}": array for name, array in axis.pack().items()}
         return Packed(arrays, {"kind": self.stored})
@@ -145,8 +157,8 @@ class Polynomial(Content):
         degrees = values["degrees"]
         axes: list[Axis] = []
         for i, degree in enumerate(degrees.max(axis=0)):
-            if f"{i}/map" in values:
-                centre, scale = values[f"{i}/map"].tolist()
+            if f"{i}/alpha" in values:
+                centre, scale = values["centre"][i].item(), values["scale"][i].item()
                 axes.append(OrthonormalPolynomials(centre, scale, values[f"{i}/alpha"], values[f"{i}/beta"]))
             else:
                 axes.append(Monomials(int(degree)))

@@ -14,7 +14,7 @@ from koopcli.content import Content
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.bases.basis import BasisChoice
 from koopcli.koopman.predictor.lifts import Observed
-from koopcli.records import Array, FloatArray, Packed
+from koopcli.records import OF_STATES, Array, FloatArray, Packed
 
 ROUNDS = 30  # of k-means; the centres need not be converged
 
@@ -101,11 +101,10 @@ class ThinPlate(Content):
 
     def pack(self) -> Packed:
         """The centres and the scaling."""
-        like = "that of the state"
         arrays = {
-            "middle": Array(self.middle, ("state",), like),
-            "scale": Array(self.scale, ("state",), like),
-            "centres": Array(self.centres, ("centre", "state"), like),
+            "middle": Array(self.middle, ("state",), OF_STATES),
+            "scale": Array(self.scale, ("state",), OF_STATES),
+            "centres": Array(self.centres, ("centre", "state"), OF_STATES),
         }
         return Packed(arrays, {"kind": self.stored})
 

@@ -44,7 +44,7 @@ def here(data: Transitions, progress: Progress = silent) -> Over:
 def pack_found(results: Found) -> Packed:
     """What a part gave, for storage."""
     return Packed(
-        {name: Array(values, tuple(f"axis {i}" for i in range(values.ndim)), "1") for name, values in results.items()}
+        {name: Array(values, tuple(f"{name}_{i}" for i in range(values.ndim)), "1") for name, values in results.items()}
     )
 
 

@@ -12,7 +12,7 @@ from koopcli.koopman.eigen.frames import FRAMES
 from koopcli.koopman.eigen.nodes import Nodes
 from koopcli.koopman.predictor.lifts import Observed
 from koopcli.koopman.predictor.modes import Modes
-from koopcli.records import Array, FloatArray, IndexArray, Packed
+from koopcli.records import OF_STATES, Array, FloatArray, IndexArray, Packed
 
 TOGETHER = 4096  # states lifted at once
 LARGEST_TABLE = 3e8  # bytes of what follows all nodes; a larger one is not made
@@ -104,8 +104,8 @@ class Futures(Content):
         """Trajectories, nodes and projection."""
         nodes = self.nodes.pack()
         arrays = {
-            "trajectories": Array(self.trajectories, ("trajectory", "sample", "state"), "those of the state"),
-            "projection": Array(self.projection, ("state of a block", "sample"), "1"),
+            "trajectories": Array(self.trajectories, ("trajectory", "sample", "state"), OF_STATES),
+            "projection": Array(self.projection, ("state_of_block", "sample_ahead"), "1"),
             **nodes.arrays,
         }
         return Packed(arrays, {"kind": self.kind, "frame": self.frame, "search": nodes.meta})

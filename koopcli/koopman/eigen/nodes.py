@@ -13,7 +13,7 @@ from koopcli.content import Content
 from koopcli.koopman.eigen.lookup.cloud import Cloud
 from koopcli.koopman.eigen.lookup.lookup import Lift, Lookup, search
 from koopcli.koopman.predictor.places import placed
-from koopcli.records import Array, FloatArray, IndexArray, Meta, Packed
+from koopcli.records import OF_STATES, Array, FloatArray, IndexArray, Meta, Packed
 
 BISECTIONS = 40
 CLOSE = 0.01  # of the wanted number of nodes: near enough
@@ -75,7 +75,7 @@ class Nodes(Content):
         """The nodes for storage, by number: their states are with the trajectories."""
         arrays = {
             "nodes": Array(self.kept, ("node",), "1"),
-            "scale": Array(self.search.scale, ("state",), "that of the state"),
+            "scale": Array(self.search.scale, ("state",), OF_STATES),
         }
         return Packed(arrays, self.about)
 

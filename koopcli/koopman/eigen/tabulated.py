@@ -11,7 +11,7 @@ from koopcli.content import Content
 from koopcli.koopman.eigen.nodes import Nodes
 from koopcli.koopman.predictor.lifts import Observed
 from koopcli.koopman.predictor.modes import Modes
-from koopcli.records import Array, FloatArray, IndexArray, Packed
+from koopcli.records import OF_STATES, Array, FloatArray, IndexArray, Packed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,8 +93,8 @@ class Tabulated(Content):
         """The table."""
         nodes = self.nodes.pack()
         arrays = {
-            "states": Array(self.states, ("trajectory", "sample", "state"), "those of the state"),
-            "starts": Array(self.starts, ("trajectory", "copy", "state of a block"), "1"),
+            "states": Array(self.states, ("trajectory", "sample", "state"), OF_STATES),
+            "starts": Array(self.starts, ("trajectory", "copy", "state_of_block"), "1"),
             **nodes.arrays,
         }
         return Packed(arrays, {"kind": self.kind, "search": nodes.meta})

@@ -42,9 +42,9 @@ class Coverage(Content):
     def pack(self, state_units: str) -> Packed:
         """The coverage for storage, inside a predictor."""
         arrays = {
-            "states": Array(self.states, ("training state", "state"), state_units),
-            "domain": Array(self.domain, ("lower and upper", "state"), state_units),
-            "facets": Array(self.facets, ("facet", "normal and offset"), "1"),
+            "states": Array(self.states, ("training_state", "state"), state_units),
+            "domain": Array(self.domain, ("lower_and_upper", "state"), state_units),
+            "facets": Array(self.facets, ("facet", "normal_and_offset"), "1"),
         }
         return Packed(arrays)
 

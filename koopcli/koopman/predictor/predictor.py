@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,7 +18,7 @@ from koopcli.koopman.predictor.lifts import Observables
 from koopcli.koopman.predictor.regression import Regression
 from koopcli.koopman.predictor.trust import Trust
 from koopcli.progress import Progress, silent
-from koopcli.records import Array, Channels, FloatArray, Meta, Packed
+from koopcli.records import OF_STATES, Array, Channels, FloatArray, Meta, Packed
 
 UnpackLift = Callable[[Packed, Dynamics], Observables]  # of what is stored of a lift, and the dynamics that go with it
 EXTRAPOLATES = "continue the functions fitted inside"
@@ -138,7 +138,7 @@ class Predictor(Content):
             **dynamics.arrays,
             "C": Array(self.C, ("state", "lifted"), state),
             **{f"coverage/{name}": array for name, array in coverage.arrays.items()},
-            **{f"lift/{name}": array for name, array in observables.arrays.items()},
+            **{f"lift/{name}": _in_units(state, array) for name, array in observables.arrays.items()},
         }
         trust = None if self.trust is None else self.trust.pack(state)
         if trust is not None:
@@ -177,6 +177,11 @@ class Predictor(Content):
             beyond=meta["beyond"],
             trust=None if meta["trust"] is None else Trust.unpack(Packed(packed.below("trust/"), meta["trust"])),
         )
+
+
+def _in_units(state: str, array: Array) -> Array:
+    """What is in units of states, with those."""
+    return replace(array, units=state) if array.units == OF_STATES else array
 
 
 def check_horizon(steps: int, horizon: int | None) -> None:

@@ -52,8 +52,8 @@ class Trust(Content):
     def pack(self, units: str) -> Packed:
         """The estimate for storage."""
         arrays = {
-            "states": Array(self.states, ("state held back", "state"), units),
-            "errors": Array(self.errors, ("state held back",), "%"),
+            "states": Array(self.states, ("state_held_back", "state"), units),
+            "errors": Array(self.errors, ("state_held_back",), "%"),
             "scale": Array(self.scale, ("state",), units),
         }
         meta: Meta = {"power": self.power, "factor": self.factor, "level": self.level}

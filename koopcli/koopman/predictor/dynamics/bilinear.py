@@ -47,9 +47,9 @@ class Bilinear(Rolled):
         """A, B and every N_i."""
         units = ", ".join(f"1/({unit})" for unit in inputs.units)
         arrays = {
-            "A": Array(self.A, ("lifted", "lifted"), "1"),
+            "A": Array(self.A, ("lifted_next", "lifted"), "1"),
             "B": of_inputs(self.B, inputs),
-            "N": Array(self.N, ("input", "lifted", "lifted"), units),
+            "N": Array(self.N, ("input", "lifted_next", "lifted"), units),
         }
         return Packed(arrays, {"kind": self.kind})
 

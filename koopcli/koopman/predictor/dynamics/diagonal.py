@@ -56,7 +56,7 @@ class Diagonal(Spectral):
         arrays = {
             "rates": Array(np.column_stack([modes.rates.real, modes.rates.imag]), ("mode", "part"), "1/s"),
             "couplings": Array(modes.couplings, ("coupling",), "1/s"),
-            "A/block": Array(modes.block, ("state of a block", "state of a block"), "1"),
+            "A/block": Array(modes.block, ("state_of_block_next", "state_of_block"), "1"),
         }
         return Packed(arrays, {"kind": self.kind, "copies": modes.copies, "dt": modes.dt, "inputs": self.inputs})
 

@@ -45,7 +45,7 @@ class Generator(Rolled):
     def pack(self, inputs: Channels) -> Packed:
         """K_0 and every K_i."""
         units = ", ".join(["1/s", *(f"1/(s {unit})" for unit in inputs.units)])
-        K = Array(self.K, ("none and each input", "lifted", "lifted"), units)
+        K = Array(self.K, ("constant_and_input", "lifted_next", "lifted"), units)
         return Packed({"K": K}, {"kind": self.kind, "dt": self.dt})
 
     @classmethod

@@ -54,7 +54,7 @@ class Linear(Spectral):
     def pack(self, inputs: Channels) -> Packed:
         """A and B."""
         return Packed(
-            {"A": Array(self.A, ("lifted", "lifted"), "1"), "B": of_inputs(self.B, inputs)}, {"kind": self.kind}
+            {"A": Array(self.A, ("lifted_next", "lifted"), "1"), "B": of_inputs(self.B, inputs)}, {"kind": self.kind}
         )
 
     @classmethod

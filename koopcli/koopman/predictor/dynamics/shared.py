@@ -51,4 +51,4 @@ class Rolled(Spectral):
 
 def of_inputs(B: FloatArray, inputs: Channels) -> Array:
     """B with the units of its columns."""
-    return Array(B, ("lifted", "input"), ", ".join(f"1/({unit})" for unit in inputs.units))
+    return Array(B, ("lifted_next", "input"), ", ".join(f"1/({unit})" for unit in inputs.units))
