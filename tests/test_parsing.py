@@ -63,7 +63,8 @@ def facts(folder, levels):
     path = folder / "x.h5"
     with h5py.File(path, "w", libver=("v110", "v110")) as file:
         hostile.honest(file)
-        file.attrs["meta"] = '{"a":' + lists(levels - 1) + "}"
+        del file["meta"]
+        hostile.put_facts(file, '{"a":' + lists(levels - 1) + "}")
     image.read_foreign(path)
 
 

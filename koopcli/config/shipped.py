@@ -8,7 +8,7 @@ from dataclasses import dataclass, is_dataclass
 
 from koopcli.choices import written
 from koopcli.config.data import data_folder
-from koopcli.vehicles.parameters import read_vehicle
+from koopcli.vehicles.parameters import read_vehicle_file
 
 DIGITS = 4  # of the digest, in what a vehicle is called that is not shipped
 
@@ -30,6 +30,19 @@ def fingerprint(source: object, names: tuple[str, ...]) -> Fingerprint:
 
 def called(wanted: Fingerprint) -> str:
     """Every shipped vehicle that has these parameters, else "own vehicle" and the first digits of their digest."""
-    shipped = {path.stem: read_vehicle(path) for path in sorted((data_folder() / "vehicles").glob("*.toml"))}
-    alike = [name for name, vehicle in shipped.items() if fingerprint(vehicle, wanted.names) == wanted]
-    return " or ".join(alike) or f"own vehicle {wanted.digest[:DIGITS]}"
+    return " or ".join(_alike(wanted)) or _own(wanted)
+
+
+def titled(wanted: Fingerprint) -> str:
+    """As :func:`called`, the vehicles by their titles."""
+    return " or ".join(_alike(wanted).values()) or _own(wanted)
+
+
+def _alike(wanted: Fingerprint) -> dict[str, str]:
+    """The shipped vehicles that have these parameters by name, with their titles."""
+    files = {path.stem: read_vehicle_file(path) for path in sorted((data_folder() / "vehicles").glob("*.toml"))}
+    return {name: file.title for name, file in files.items() if fingerprint(file.parameters, wanted.names) == wanted}
+
+
+def _own(wanted: Fingerprint) -> str:
+    return f"own vehicle {wanted.digest[:DIGITS]}"

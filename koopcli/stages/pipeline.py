@@ -10,6 +10,7 @@ from typing import Any
 from koopcli.errors import DamagedArtefactError, StorageError, UnknownNameError
 from koopcli.stages.base import Context, Cost, Reporter, Stage, Task
 from koopcli.stages.chunks import Chunk, ChunkedWork
+from koopcli.stages.labels import labels
 from koopcli.stages.recorded import content_of, recipe_of, settings_of
 from koopcli.stages.registry import STAGES
 from koopcli.stages.vehicle import doubts
@@ -236,7 +237,8 @@ class Pipeline:
             )
             chunks = ChunkedWork(self.store, whole, self.workers, progress, self.reporter.note, cost(task).bytes)
             packed = stage.run(task.settings, contents, Context(progress, self.reporter.warn, chunks)).pack()
-        return self.store.commit(recipe, lineage, packed, provenance(time.perf_counter() - start))
+        told = labels(task, packed)
+        return self.store.commit(recipe, lineage, packed, provenance(time.perf_counter() - start), told)
 
     def _rebuildable(self, task: Task, record: Record | None) -> None:
         """Refuse to replace a named artefact by something that today's code would not give the same key."""

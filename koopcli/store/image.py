@@ -7,31 +7,34 @@ from __future__ import annotations
 
 import io
 import json
-import mmap
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from types import MappingProxyType
 from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5d, h5f, h5g, h5o, h5p
+from h5py import h5d, h5f, h5g, h5p
 
 from koopcli.errors import InvalidValueError
 from koopcli.parsing import TooDeepError, parse_json
-from koopcli.records import Array, Packed
+from koopcli.records import Array, Meta, Packed
 from koopcli.store.files import UntrustedFileError, open_regular, own_name, refuse_without_room, reserve, write_at
 from koopcli.store.identity import canonical, plain, slabs
-from koopcli.store.superblock import mended
-from koopcli.store.texts import Texts
-from koopcli.store.walk import LARGEST, refusals, refuse, walk
+from koopcli.store.superblock import SUPERBLOCK, mended, refuse_other_formats
+from koopcli.store.walk import LARGEST, refusals, refuse, text_beside, walk
 from koopcli.text import printable
 
 MEMORY_BLOCK = 1 << 16  # bytes by which an image in memory grows
 IMAGE_LIMIT = 32 << 20  # bytes that are laid out in memory, which takes several times as many
 MEMORY_LIMIT = 256 << 20  # bytes that are read as a whole
 IN_MEMORY = 4 * MEMORY_LIMIT  # bytes that an image in memory may unpack to
+META, META_LIMIT = "meta", 16 << 20  # the array that holds the small facts as JSON, and its largest size
+
+Labels = Mapping[str, str | float]  # what people may want to know of a file, beside its record
+NO_LABELS: Labels = MappingProxyType({})
 
 
 def data_bytes(packed: Packed) -> int:
@@ -41,18 +44,18 @@ def data_bytes(packed: Packed) -> int:
     )
 
 
-def to_bytes(packed: Packed) -> bytes:
-    """The HDF5 image; the same record gives the same bytes."""
+def to_bytes(packed: Packed, labels: Labels = NO_LABELS) -> bytes:
+    """The HDF5 image; the same record and ``labels`` give the same bytes."""
     access = h5p.create(h5p.FILE_ACCESS)
     access.set_fapl_core(MEMORY_BLOCK, False)
     with _created(own_name(), access) as file:
-        for dataset, array in _laid_out(file, packed):
+        for dataset, array in _laid_out(file, packed, labels):
             dataset[...] = array.values[...]
         file.flush()
         return mended(file.id.get_file_image())
 
 
-def to_file(packed: Packed, path: Path) -> None:
+def to_file(packed: Packed, path: Path, labels: Labels = NO_LABELS) -> None:
     """The HDF5 image in a new file. HDF5 only lays it out: it does not survive a disk that is full.
 
     The space is reserved before the first value, and the values are written to their places by plain system calls.
@@ -61,7 +64,7 @@ def to_file(packed: Packed, path: Path) -> None:
     access = h5p.create(h5p.FILE_ACCESS)
     access.set_file_locking(False, True)
     with _created(path, access) as file:
-        places = [(dataset.id.get_offset(), array) for dataset, array in _laid_out(file, packed)]
+        places = [(dataset.id.get_offset(), array) for dataset, array in _laid_out(file, packed, labels)]
     descriptor = os.open(path, os.O_RDWR)
     try:
         reserve(descriptor, os.fstat(descriptor).st_size)
@@ -78,10 +81,9 @@ def to_file(packed: Packed, path: Path) -> None:
 def from_bytes(image: bytes) -> Packed:
     """The record of an image in memory, its arrays in memory too. Raises ``UntrustedFileError``."""
     with refusals():
-        texts = Texts(image)
+        refuse_other_formats(image[:SUPERBLOCK])
         with h5py.File.in_memory(image) as file:
-            lazy = _packed(file, texts, IN_MEMORY)
-            return loaded(lazy)
+            return loaded(_packed(file, IN_MEMORY))
 
 
 def loaded(packed: Packed) -> Packed:
@@ -91,14 +93,14 @@ def loaded(packed: Packed) -> Packed:
 
 def from_open(opened: io.FileIO) -> Packed:
     """The record of that very file, whatever its path leads to by now; arrays that are large stay on disk."""
-    with refusals(), mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as content:
-        texts = Texts(content)
+    with refusals():
+        refuse_other_formats(os.pread(opened.fileno(), SUPERBLOCK, 0))
         # Not by its path: that may be another file by now, one as good, or none.
         file = h5py.File(_Opened(os.dup(opened.fileno())), "r", locking=False)
         try:
-            if len(content) > MEMORY_LIMIT:
-                return _packed(file, texts)
-            packed = loaded(_packed(file, texts, IN_MEMORY))
+            if os.fstat(opened.fileno()).st_size > MEMORY_LIMIT:
+                return _packed(file)
+            packed = loaded(_packed(file, IN_MEMORY))
         except BaseException:
             file.close()
             raise
@@ -128,8 +130,7 @@ def read_foreign(path: Path) -> Packed:
 def from_path(path: Path) -> Packed:
     """The record of a file that is open only while it is read, as one of many; its arrays stay on disk."""
     with refusals(), h5py.File(path, "r", locking=False) as file:
-        with mmap.mmap(file.id.get_vfd_handle(), 0, access=mmap.ACCESS_READ) as content:
-            lazy = _packed(file, Texts(content))
+        lazy = _packed(file)
         arrays = {
             name: Array(_OnDisk(path, name, a.values.shape, a.values.dtype), a.axes, a.units)
             for name, a in lazy.arrays.items()
@@ -165,20 +166,33 @@ def _timeless(kind: Any) -> Any:
     return how
 
 
-def _laid_out(file: h5py.File, packed: Packed) -> Iterator[tuple[h5py.Dataset, Array]]:
-    """Every array's dataset, with its attributes and without its values."""
-    file.attrs["meta"] = json.dumps(plain(packed.meta), sort_keys=True)
+def _laid_out(file: h5py.File, packed: Packed, labels: Labels) -> Iterator[tuple[h5py.Dataset, Array]]:
+    """Every array's dataset, with its attributes and without its values; the facts are one too."""
+    assert META not in packed.arrays, "the name is taken"
+    facts = json.dumps(plain(packed.meta), sort_keys=True).encode()
+    arrays = {**packed.arrays, META: Array(np.frombuffer(facts, np.uint8), ("byte",), "1")}
+    for name, label in labels.items():
+        _beside(file, name, label)
     layout = _timeless(h5p.DATASET_CREATE)
     layout.set_layout(h5d.CONTIGUOUS)
     layout.set_alloc_time(h5d.ALLOC_TIME_EARLY)
     layout.set_fill_time(h5d.FILL_TIME_NEVER)
-    for group in sorted({str(parent) for path in packed.arrays for parent in PurePosixPath(path).parents} - {"."}):
+    for group in sorted({str(parent) for path in arrays for parent in PurePosixPath(path).parents} - {"."}):
         h5g.create(file.id, group.encode(), gcpl=_timeless(h5p.GROUP_CREATE))
-    for path, array in sorted(packed.arrays.items()):
+    for path, array in sorted(arrays.items()):
         dataset = file.create_dataset(path, shape=array.values.shape, dtype=_stored(array), dcpl=layout.copy())
-        dataset.attrs["units"] = array.units
-        dataset.attrs["axes"] = ", ".join(array.axes)
+        _beside(dataset, "units", array.units)
+        _beside(dataset, "axes", ", ".join(array.axes))
         yield dataset, array
+
+
+def _beside(item: h5py.HLObject, name: str, value: str | float) -> None:
+    """An attribute. A text is of fixed length: those of variable length lie in heaps that no checksum guards."""
+    if isinstance(value, str):
+        content = value.encode()
+        item.attrs.create(name, content, dtype=h5py.string_dtype("utf-8", max(1, len(content))))
+    else:
+        item.attrs[name] = value
 
 
 def _stored(array: Array) -> np.dtype[Any]:
@@ -186,20 +200,28 @@ def _stored(array: Array) -> np.dtype[Any]:
     return dtype.newbyteorder("<")
 
 
-def _packed(file: h5py.File, texts: Texts, limit: int = LARGEST) -> Packed:
+def _packed(file: h5py.File, limit: int = LARGEST) -> Packed:
     """The record of an open file that has passed the walk; its arrays are the file's own datasets."""
+    datasets = walk(file, limit)
+    meta = _meta(datasets.pop(META, None))
     arrays: dict[str, Array] = {}
-    for path, dataset in walk(file, limit).items():
-        beside = texts.of(h5o.get_info(dataset.id).addr)
-        axes, units = beside.get("axes", "\0"), beside.get("units", "\0")
+    for path, dataset in datasets.items():
+        axes, units = text_beside(dataset.id, "axes"), text_beside(dataset.id, "units")
         array = Array(dataset, tuple(axes.split(", ")), units)
         if not (axes + units).isprintable() or len(array.axes) != len(dataset.shape):
             refuse(f"'{path}' lacks the names or the units of its axes")
         if dataset.dtype == bool and any((slab.view(np.uint8) > 1).any() for slab in slabs(dataset)):
             refuse(f"'{path}' holds something between true and false")  # which numpy would count wrongly
         arrays[path] = array
+    return Packed(arrays, meta)
+
+
+def _meta(dataset: h5py.Dataset | None) -> Meta:
+    """The small facts of a record."""
+    if dataset is None or dataset.dtype != np.uint8 or dataset.ndim != 1 or dataset.size > META_LIMIT:
+        refuse("its facts are not a JSON object")
     try:
-        meta = parse_json(texts.of(h5o.get_info(file.id).addr).get("meta", ""))
+        meta = parse_json(dataset[...].tobytes())
         canonical(meta)  # finite and of Unicode
     except TooDeepError as error:
         refuse(f"its facts are {error}")
@@ -207,4 +229,4 @@ def _packed(file: h5py.File, texts: Texts, limit: int = LARGEST) -> Packed:
         meta = None
     if not isinstance(meta, dict):
         refuse("its facts are not a JSON object")
-    return Packed(arrays, meta)
+    return meta

@@ -135,14 +135,19 @@ class Store:
     # writing
 
     def commit(
-        self, recipe: Mapping[str, Any], lineage: Mapping[str, str], packed: Packed, provenance: Mapping[str, Any]
+        self,
+        recipe: Mapping[str, Any],
+        lineage: Mapping[str, str],
+        packed: Packed,
+        provenance: Mapping[str, Any],
+        labels: image.Labels = image.NO_LABELS,
     ) -> Record:
-        """Store ``packed`` under ``recipe``: the object first, the record last.
+        """Store ``packed`` under ``recipe``, with ``labels`` for other tools: the object first, the record last.
 
         Where locks do not hold, another process may have committed the same recipe meanwhile: the first record wins.
         """
         digest = data_digest(packed)
-        path, size, _ = self._put(packed, self._object_path)
+        path, size, _ = self._put(packed, self._object_path, labels)
         record = Record(recipe, lineage, path.stem, size, digest, provenance)
         first = self.record(record.stage, record.key)
         if first is not None and self.has_object(first):
@@ -150,7 +155,7 @@ class Store:
         with storage_errors(self.root):
             self._publish(self._record_path(record.stage, record.key), record.to_json())
         if not path.exists():  # a collection took it for an orphan just before its record was there
-            self._put(packed, self._object_path)
+            self._put(packed, self._object_path, labels)
         return record
 
     def folder(self) -> Path:
@@ -172,14 +177,16 @@ class Store:
         """The committed chunks of an unfinished artefact."""
         return Parts(self.root / "partial" / key, self._put)
 
-    def _put(self, packed: Packed, target: Callable[[str], Path]) -> Published:
+    def _put(self, packed: Packed, target: Callable[[str], Path], labels: image.Labels = image.NO_LABELS) -> Published:
         """Write the image of ``packed`` to ``target(sha256)``, through memory unless it is large."""
         needed = image.data_bytes(packed)
         with storage_errors(self.root, needed):
             if needed <= image.IMAGE_LIMIT:
-                content = image.to_bytes(packed)
+                content = image.to_bytes(packed, labels)
                 return self._publish(target(hashlib.sha256(content).hexdigest()), content)
-            return self._publish(lambda path: target(sha256_file(path)), lambda path: image.to_file(packed, path))
+            return self._publish(
+                lambda path: target(sha256_file(path)), lambda path: image.to_file(packed, path, labels)
+            )
 
     def _publish(self, target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path], None]) -> Published:
         """Publish a file; the first time, clear old litter by the file system's own clock."""

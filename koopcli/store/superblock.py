@@ -1,4 +1,4 @@
-"""The checksum of the block that an HDF5 file of format 1.10 begins with.
+"""The block that an HDF5 file of format 1.10 begins with, and its checksum.
 
 While a file is written, a flag there says so, and an image taken meanwhile has it cleared. HDF5 below 2.0 leaves the
 checksum of the flagged block in the image, which then no HDF5 opens.
@@ -6,18 +6,33 @@ checksum of the flagged block in the image, which then no HDF5 opens.
 
 from __future__ import annotations
 
+import re
 import struct
 
-LENGTH = 44  # bytes of the block before its checksum
+from koopcli.store.files import UntrustedFileError
+
+SUPERBLOCK = 44  # bytes of the block before its checksum
 ROUND = (4, 6, 8, 16, 19, 4)  # bits to turn by
 LAST = ((2, 1, 14), (0, 2, 11), (1, 0, 25), (2, 1, 16), (0, 2, 4), (1, 0, 14), (2, 1, 24))  # word, by which, bits
+
+HEAD = re.compile(rb"\x89HDF\r\n\x1a\n[\x02\x03]\x08\x08")  # places and lengths of 8 bytes
+
+
+def refuse_other_formats(start: bytes) -> None:
+    """Raise ``UntrustedFileError`` for a file that does not begin as one of format 1.8 or later does."""
+    if not HEAD.match(start):
+        raise UntrustedFileError("it is not HDF5 of format 1.8 or later")
 
 
 def mended(image: bytes) -> bytes:
     """The image with the checksum that its superblock has; itself where that is right."""
-    checksum = lookup3(image[:LENGTH])
-    end = LENGTH + len(checksum)
-    return image if image[LENGTH:end] == checksum else b"".join((image[:LENGTH], checksum, memoryview(image)[end:]))
+    checksum = lookup3(image[:SUPERBLOCK])
+    end = SUPERBLOCK + len(checksum)
+    return (
+        image
+        if image[SUPERBLOCK:end] == checksum
+        else b"".join((image[:SUPERBLOCK], checksum, memoryview(image)[end:]))
+    )
 
 
 def lookup3(data: bytes) -> bytes:

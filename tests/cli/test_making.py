@@ -51,7 +51,7 @@ def test_json_of_a_fit_and_an_evaluation(koop):
     assert (scores["trajectories"], scores["steps"], scores["diverged"]) == (40, 5, 0)
     assert 0 < scores["in_domain_share"] <= 1
     with h5py.File(scores["path"]) as file:
-        assert file["rmse"].attrs["units"] == "%"
+        assert file["rmse"].attrs["units"] == b"%"
         assert scores["rmse"]["mean"] == pytest.approx(file["rmse"][()].mean())
     assert json.loads(koop("evaluate", fit["name"], "--json").out)["cached"]
 

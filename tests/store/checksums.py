@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from koopcli.store.superblock import LENGTH, lookup3
+from koopcli.store.superblock import SUPERBLOCK, lookup3
 
 
 def sums(content: bytes) -> list[tuple[int, int]]:
     """Where in a file of format 1.10 a checksum follows: the superblock, object headers, what continues them."""
-    found = [(0, LENGTH)]
+    found = [(0, SUPERBLOCK)]
     at = -1
     while (at := content.find(b"OHDR\2", at + 1)) >= 0:
         flags = content[at + 5]

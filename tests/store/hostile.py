@@ -46,13 +46,17 @@ def raw(reason: str) -> Callable[[Callable[[bytes], bytes]], Callable[[bytes], b
 
 
 def honest(file: h5py.File) -> None:
-    file.attrs["meta"] = '{"dt": 0.1}'
+    put_facts(file, '{"dt": 0.1}')
     describe(file.create_dataset("x", data=np.arange(LENGTH, dtype=np.uint8)))
 
 
+def put_facts(file: h5py.File, text: str) -> None:
+    describe(file.create_dataset("meta", data=np.frombuffer(text.encode(), np.uint8)), "byte")
+
+
 def describe(dataset: h5py.Dataset, axes: str = "row", units: str = "1") -> None:
-    dataset.attrs["units"] = units
-    dataset.attrs["axes"] = axes
+    dataset.attrs["units"] = np.bytes_(units)
+    dataset.attrs["axes"] = np.bytes_(axes)
 
 
 def make(name: str, path: Path, secret: Path) -> Path:
@@ -390,7 +394,7 @@ def a_hundred_attributes(file, secret):
 
 @case("lacks the names or the units")
 def fewer_axes_than_named(file, secret):
-    file["x"].attrs["axes"] = "row, column"
+    file["x"].attrs["axes"] = np.bytes_("row, column")
 
 
 @case("lacks the names or the units")
@@ -405,14 +409,34 @@ def units_that_are_a_number(file, secret):
 
 @case("lacks the names or the units")
 def escape_in_the_units(file, secret):
-    file["x"].attrs["units"] = "\x1b]0;evil\x07"
+    file["x"].attrs["units"] = np.bytes_("\x1b]0;evil\x07")
+
+
+@case("lacks the names or the units")
+def units_in_a_list(file, secret):
+    file["x"].attrs["units"] = np.array([b"1", b"1"])
+
+
+@case("can't decode")
+def units_without_unicode(file, secret):
+    file["x"].attrs["units"] = np.bytes_(b"\xff\xfe")
+
+
+@case("text of variable length")
+def units_of_variable_length(file, secret):
+    file["x"].attrs["units"] = "m"
+
+
+@case("text of variable length")
+def a_text_of_variable_length_beside_the_root(file, secret):
+    file.attrs["title"] = "evil"
 
 
 def _meta(name: str, text: str | None, reason: str = "facts are not a JSON object") -> None:
     def change(file, secret):
-        del file.attrs["meta"]
+        del file["meta"]
         if text is not None:
-            file.attrs["meta"] = text
+            put_facts(file, text)
 
     CASES[name] = change, reason
 
@@ -426,7 +450,29 @@ _meta("facts_not_a_number", '{"a": NaN}')
 _meta("facts_of_half_a_character", '{"a": "\\ud800"}')
 
 
+@case("facts are not a JSON object")
+def facts_in_a_table(file, secret):
+    del file["meta"]
+    describe(file.create_dataset("meta", data=np.frombuffer(b'{"a":1}\n', np.uint8).reshape(2, 4)), "row, byte")
+
+
+@case("facts are not a JSON object")
+def facts_that_are_a_group(file, secret):
+    del file["meta"]
+    describe(file.create_dataset("meta/x", data=np.arange(3)))
+
+
 # bytes
+
+
+@raw("format 1.8 or later")
+def old_groups(content):
+    """Their names lie in heaps that no checksum guards."""
+    memory = io.BytesIO()
+    with h5py.File(memory, "w", libver=("earliest", "v110")) as file:
+        honest(file)
+        file.create_group("group")["y"] = np.arange(3)
+    return memory.getvalue()
 
 
 @raw("format 1.8 or later")
@@ -454,16 +500,26 @@ def cut_off(content):
     return content[:-100]
 
 
-@raw("not where it should be|no end")
+def _with_heap(content: bytes) -> bytes:
+    """The file with a text of variable length."""
+    memory = io.BytesIO(content)
+    with h5py.File(memory, "r+", libver=("v110", "v110")) as file:
+        file.attrs["title"] = "abc"
+    return memory.getvalue()
+
+
+@raw("text of variable length")
 def heap_that_goes_nowhere(content):
     """A text of no step to the next one: HDF5 never returns from it."""
+    content = _with_heap(content)
     heap = content.index(b"GCOL") + 16
     return content[:heap] + struct.pack("<HHIQ", 0, 0, 0, 0) + content[heap + 16 :]
 
 
-@raw("not where it should be")
+@raw("text of variable length")
 def text_of_gigabytes(content):
     """HDF5 clears the memory for it before it finds that the text has three letters."""
+    content = _with_heap(content)
     changed = bytearray(content)
     length = content.index(struct.pack("<IQ", 3, content.index(b"GCOL")))
     changed[length + 3] = 0x3F

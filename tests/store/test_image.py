@@ -9,7 +9,7 @@ import numpy as np
 
 from koopcli.records import Array, Packed
 from koopcli.store import files, image
-from koopcli.store.superblock import LENGTH, lookup3, mended
+from koopcli.store.superblock import SUPERBLOCK, lookup3, mended
 from tests.store.checksums import sums
 
 MAKE = """
@@ -31,8 +31,8 @@ def test_every_checksum_of_an_image_is_right():
     places = sums(content)
     assert len(places) >= 4
     assert all(lookup3(content[start:end]) == content[end : end + 4] for start, end in places)
-    being_written = content[:11] + b"\1" + content[12:LENGTH]
-    assert mended(content[:LENGTH] + lookup3(being_written) + content[LENGTH + 4 :]) == content
+    being_written = content[:11] + b"\1" + content[12:SUPERBLOCK]
+    assert mended(content[:SUPERBLOCK] + lookup3(being_written) + content[SUPERBLOCK + 4 :]) == content
 
 
 def test_no_object_keeps_when_it_was_made(tmp_path):
@@ -50,8 +50,8 @@ def test_every_dataset_is_contiguous_and_carries_units_and_axes(tmp_path):
     path = tmp_path / "x.h5"
     path.write_bytes(image.to_bytes(packed))
     with h5py.File(path) as file:
-        assert file["g/x"].attrs["units"] == "m/s, rad/s"
-        assert file["g/x"].attrs["axes"] == "row, state"
+        assert file["g/x"].attrs["units"] == b"m/s, rad/s"
+        assert file["g/x"].attrs["axes"] == b"row, state"
         assert file["g/x"].chunks is None
         assert file["g/x"].compression is None
 
