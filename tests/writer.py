@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,9 +23,12 @@ def content(seed: int) -> Packed:
     return Packed({"x": Array(seed + np.arange(4000.0), ("row",), "m")}, {"seed": seed})
 
 
+def recipe(seed: int) -> dict[str, Any]:
+    return {"schema": SCHEMA, "stage": "sample", "version": 1, "settings": {"seed": seed}, "inputs": {}}
+
+
 def commit(store: Store, seed: int) -> Record:
-    recipe = {"schema": SCHEMA, "stage": "sample", "version": 1, "settings": {"seed": seed}, "inputs": {}}
-    return store.commit(recipe, {}, content(seed), {"time": "2026-01-01", "seconds": 0.0})
+    return store.commit(recipe(seed), {}, content(seed), {"time": "2026-01-01", "seconds": 0.0})
 
 
 def main(root: str, first: int, count: int) -> None:

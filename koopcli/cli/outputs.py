@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 from io import StringIO
 from pathlib import Path
 from typing import Annotated, Any, get_args
@@ -77,15 +78,17 @@ def _in_place(path: Path) -> bool:
 
 
 def _write(path: Path, content: bytes) -> None:
-    from koopcli.store.files import own_name
+    from koopcli.store.files import own_name, sync, write_new
 
     beside = path.with_name(f".{own_name()}")  # the file's own name may leave no room for more
     try:
         if _in_place(path):
             path.write_bytes(content)
             return
-        beside.write_bytes(content)
+        write_new(beside, content)
         os.replace(beside, path)
+        with suppress(PermissionError):  # of a folder that can be written to but not read
+            sync(path.parent)
     except OSError as error:
         raise _refused(path, error) from error
     finally:

@@ -249,7 +249,7 @@ def _write_report(
     from koopcli.reproduction.layout import full_table
     from koopcli.reproduction.opening import opening
     from koopcli.reproduction.page import Section, page
-    from koopcli.store.files import publish, storage_errors
+    from koopcli.store.files import publish, storage_errors, sync_young
 
     root = call.pipeline.store.root
     path = root / "reports" / f"{name}-{identity or _identity(parts)}" / "report.html"
@@ -269,7 +269,9 @@ def _write_report(
     version = f"koop {__version__}"
     content = page(opening(parts, shown, version), sections, command, version).encode()
     with storage_errors(root):
-        if not path.is_file() or path.read_bytes() != content:
+        if path.is_file() and path.read_bytes() == content:
+            sync_young(path)
+        else:
             publish(path, content, root / "tmp")
     return path
 

@@ -179,6 +179,7 @@ class Pipeline:
             self.reporter.warn(f"{error}; making it again")
             return None
         self._records[task] = record
+        self.store.sync(record)
         self.announce(record.name, "reused")
         return content
 

@@ -17,7 +17,6 @@ from koopcli.errors import (
     UnknownNameError,
     UsageError,
 )
-from koopcli.parsing import parse_json
 from koopcli.records import Packed
 from koopcli.stages.base import Reporter, Task
 from koopcli.stages.pipeline import Pipeline
@@ -26,6 +25,7 @@ from koopcli.stages.registry import STAGES
 from koopcli.store import Record, Store
 from koopcli.store.files import UntrustedFileError, open_regular, read_small
 from koopcli.store.identity import key_of
+from koopcli.store.records import whole_recipe
 from koopcli.store.survey import look, records
 from koopcli.store.verify import Finding
 
@@ -77,18 +77,21 @@ class _Lost:
 
 
 def _put_aside(store: Store, findings: Sequence[Finding]) -> list[_Lost]:
-    """Move damaged files away; returns the recipes in damaged records that are still what their names say."""
-    lost = []
-    for path in dict.fromkeys(
-        finding.path for finding in findings if finding.kind in ("damaged record", "damaged object")
-    ):
-        file = store.root / path
-        if not _still_damaged(file):
-            continue
-        if path.startswith("records/") and (recipe := _recipe(file)) is not None:
-            lost.append(_Lost(f"{file.parent.name}/{file.stem}", recipe))
-        store.put_aside(file)
-    return lost
+    """Move damaged files away; returns the recipes in damaged records that are still what their names say.
+
+    A record that was put aside before, as by a command that met it or a repair that was cut off, is as good.
+    """
+    lost: dict[str, _Lost] = {}
+    for finding in findings:
+        file = store.root / finding.path
+        damaged = finding.kind in ("damaged record", "damaged object") and _still_damaged(file)
+        if finding.kind == "record put aside" or (finding.kind == "damaged record" and damaged):
+            recipe = _recipe(file, finding.artefact)
+            if recipe is not None:
+                lost[finding.artefact] = _Lost(finding.artefact, recipe)
+        if damaged:
+            store.put_aside(file)
+    return list(lost.values())
 
 
 def _still_damaged(path: Path) -> bool:
@@ -107,22 +110,14 @@ def _still_damaged(path: Path) -> bool:
         return True
 
 
-def _recipe(path: Path) -> dict[str, Any] | None:
-    """The recipe in a damaged record, if it hashes to the record's name."""
+def _recipe(path: Path, full: str) -> dict[str, Any] | None:
+    """The recipe in the damaged record of ``full``, if it is one of that name and of a stage known here."""
+    stage, _, key = full.partition("/")
     try:
-        recipe = parse_json(read_small(path))["recipe"]
-        good = key_of(recipe) == path.stem and recipe["stage"] == path.parent.name and recipe["stage"] in STAGES
-        return dict(recipe) if good else None
-    except (
-        OSError,
-        UntrustedFileError,
-        ValueError,
-        KeyError,
-        TypeError,
-        AttributeError,
-        InvalidValueError,
-    ):
+        recipe = whole_recipe(read_small(path), key)
+    except (OSError, UntrustedFileError):
         return None
+    return recipe if recipe is not None and recipe["stage"] == stage and stage in STAGES else None
 
 
 def _make_lost(pipeline: Pipeline, lost: Sequence[_Lost]) -> set[str]:

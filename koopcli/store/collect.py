@@ -19,7 +19,7 @@ from koopcli.progress import Progress, silent
 from koopcli.store.files import DAY, HOUR, make_folder, own_name, storage_errors
 from koopcli.store.locks import if_free
 from koopcli.store.store import Store
-from koopcli.store.survey import DIGEST, File, Recorded, Stock, look, object_path, pinned, records, survey
+from koopcli.store.survey import DIGEST, PUT_ASIDE, File, Recorded, Stock, look, object_path, pinned, records, survey
 from koopcli.text import printable
 
 NAMES = re.compile(rf"(?<![0-9a-f]){DIGEST}(?![0-9a-f])".encode())
@@ -85,7 +85,7 @@ def plan(store: Store, grace: float, *, delete: bool = False, progress: Progress
             if now - file.mtime >= max(grace, HOUR) and _free(file.path)
         ),
     ]
-    return CollectionPlan(tuple(removals), len(kept), stock, clock)
+    return CollectionPlan(tuple(removals), len(kept & stock.records.keys()), stock, clock)
 
 
 def remove(store: Store, planned: CollectionPlan, progress: Progress = silent) -> list[Removal]:
@@ -117,15 +117,16 @@ def _kept(stock: Stock, before: float) -> set[str]:
 
     What was made again is as young as its object, whatever the age of its record.
     """
-    waiting = [name for names in stock.pins.values() for name in names or []]
+    waiting = [*stock.lost, *(name for names in stock.pins.values() for name in names or [])]
     for full, recorded in stock.records.items():
         file = stock.objects.get(recorded.record.object) if recorded.record is not None else None
         if recorded.record is None or max(recorded.file.mtime, file.mtime if file else 0.0) > before:
             waiting.append(full)
-    return _closure(stock.records, waiting)
+    return _closure(stock, waiting)
 
 
-def _closure(records: dict[str, Recorded], waiting: Sequence[str]) -> set[str]:
+def _closure(stock: Stock, waiting: Sequence[str]) -> set[str]:
+    records = _recorded(stock)
     by_key = {recorded.key: full for full, recorded in records.items()}
     closure: set[str] = set()
     left = list(waiting)
@@ -140,6 +141,11 @@ def _closure(records: dict[str, Recorded], waiting: Sequence[str]) -> set[str]:
     return closure
 
 
+def _recorded(stock: Stock) -> dict[str, Recorded]:
+    """Every record, also those that were put aside and can be made again."""
+    return {**stock.lost, **stock.records}
+
+
 def _named(recorded: Recorded) -> set[str]:
     """Every digest and key that a record names, in any format."""
     if recorded.record is not None:
@@ -149,7 +155,7 @@ def _named(recorded: Recorded) -> set[str]:
 
 def _artefacts(store: Store, stock: Stock, kept: set[str], before: float) -> Iterator[Removal]:
     """Records that nobody keeps, each with its object once no other record names it; then objects without any."""
-    wanted = {digest for full in kept for digest in _named(stock.records[full])}
+    wanted = {digest for full in kept for digest in _named(_recorded(stock)[full])}
     freed: set[str] = set()
     for full in sorted(stock.records.keys() - kept):
         recorded = stock.records[full]
@@ -204,13 +210,21 @@ def _remove_record(store: Store, removal: Removal, stock: Stock) -> bool:
     if now.record is not None and not _untouched(store, now.record.object, stock):
         return False
     wanted = [name for names in pins.values() for name in names or []]
-    if removal.key in _closure(stock.records, wanted):
+    if removal.key in _closure(stock, wanted):
         return False
+    _give_up(store, key)
     try:
         file.path.unlink()
     except FileNotFoundError:
         return False
     return True
+
+
+def _give_up(store: Store, key: str) -> None:
+    """Rename what was put aside of an artefact, so that nobody takes that for lost which is now removed."""
+    for path in (store.root / "quarantine").glob(f"{key}.json*"):
+        if PUT_ASIDE.fullmatch(path.name):
+            os.replace(path, path.with_name(f"{path.name}.{own_name()}"))
 
 
 def _remove_files(store: Store, removal: Removal) -> bool:

@@ -11,6 +11,7 @@ import secrets
 import shutil
 import socket
 import stat
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -20,6 +21,7 @@ from koopcli.errors import DamagedArtefactError, StorageError
 from koopcli.store.remedies import FULL, remedy
 
 HOUR, DAY = 3600.0, 86400.0
+YOUNG = 60.0  # seconds after which a system has written what it was given, synced or not
 PIECE = 16 << 20  # bytes read and written at a time
 JSON_LIMIT = 16 << 20  # bytes of a record or a pin
 
@@ -71,14 +73,15 @@ def publish(target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path]
     ``fill`` is the content, or writes it to the path it is given; ``target`` is the path, or finds it from the
     finished file; ``temporary`` is a folder on the same file system.
     """
-    make_folder(temporary)
+    if not temporary.is_dir():
+        make_folder(temporary)
     beside = temporary / own_name()
     try:
         if isinstance(fill, bytes):
-            _write_new(beside, fill)
+            write_new(beside, fill)
         else:
             fill(beside)
-            _fsync(beside)
+            sync(beside)
         final = target if isinstance(target, Path) else target(beside)
         make_folder(final.parent)
         about = beside.stat()
@@ -87,7 +90,7 @@ def publish(target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path]
         with suppress(OSError):
             beside.unlink(missing_ok=True)
         raise
-    _fsync(final.parent)
+    sync(final.parent)
     return Published(final, about.st_size, about.st_mtime)
 
 
@@ -132,13 +135,50 @@ def read_small(path: Path) -> bytes:
         return file.read(JSON_LIMIT)
 
 
+def write_new(path: Path, content: bytes) -> None:
+    """Write ``content`` to a new file, and sync it."""
+    descriptor = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
+    try:
+        write_at(descriptor, memoryview(content), 0)
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def sync(path: Path) -> None:
+    """Make the content of a file last, or the names in a folder."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def sync_young(path: Path, *before: Path) -> None:
+    """Sync a file and its folder, after others that belong ``before`` it, if the file is younger than a minute.
+
+    Another process may just have put it there and not have synced it; a time in the future says as little. Where
+    syncing fails, as in a read-only store, the file is as good to read as before.
+    """
+    with suppress(OSError):
+        if path.stat().st_mtime > time.time() - YOUNG:
+            for file in (*before, path):
+                sync(file)
+                sync(file.parent)
+
+
 def make_folder(path: Path) -> None:
-    """Create ``path`` and its parents durably."""
-    if path.is_dir():
+    """Create ``path`` and its parents durably.
+
+    One that is there and empty may have been made by another process that has not synced it. Whoever put the first
+    file into a folder had synced the folder before.
+    """
+    if not path.is_dir():
+        make_folder(path.parent)
+        path.mkdir(exist_ok=True)
+    elif not _is_empty(path) or not os.access(path.parent, os.R_OK):
         return
-    make_folder(path.parent)
-    path.mkdir(exist_ok=True)
-    _fsync(path.parent)
+    sync(path.parent)
 
 
 def sweep(temporary: Path, now: float) -> None:
@@ -189,21 +229,9 @@ def size_text(size: float) -> str:
     return f"{size:.1f} TB"
 
 
-def _write_new(path: Path, content: bytes) -> None:
-    descriptor = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
-    try:
-        write_at(descriptor, memoryview(content), 0)
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
-def _fsync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+def _is_empty(folder: Path) -> bool:
+    with os.scandir(folder) as entries:
+        return next(entries, None) is None
 
 
 def _orphaned(name: str) -> bool:

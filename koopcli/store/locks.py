@@ -13,7 +13,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from koopcli.errors import InvalidValueError, LockTimeoutError
-from koopcli.store.files import storage_errors
+from koopcli.store.files import make_folder, storage_errors
 
 LOCK_TIMEOUT = "KOOP_LOCK_TIMEOUT"
 WITHOUT_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL)
@@ -27,7 +27,7 @@ def hold(path: Path, name: str, warn: Callable[[str], None]) -> Iterator[None]:
     """
     lock = FileLock(path)
     with storage_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
     try:
         lock.acquire(timeout=0)
     except Timeout:

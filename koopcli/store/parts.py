@@ -11,7 +11,7 @@ from pathlib import Path
 from koopcli.records import Packed
 from koopcli.store import image
 from koopcli.store.code import code_digest
-from koopcli.store.files import Published, UntrustedFileError, open_regular, storage_errors
+from koopcli.store.files import Published, UntrustedFileError, open_regular, storage_errors, sync
 
 HELD = 64 << 20  # bytes of the chunks of one artefact that are held in memory; others are read where they are needed
 CHUNK = re.compile(r"(\d+)-([0-9a-f]{64})(?:-([0-9a-f]{64}))?\.h5")  # number, digest, code, which was not told once
@@ -59,12 +59,14 @@ class Parts:
         return len(others)
 
     def drop(self, first: int) -> None:
-        """Remove chunk ``first`` and all after it: they were made with something else."""
+        """Remove chunk ``first`` and all after it, for good: they were made with something else."""
         with storage_errors(self._folder):
-            for path in self._files():
-                match = CHUNK.fullmatch(path.name)
-                if match and int(match[1]) >= first:
-                    path.unlink(missing_ok=True)
+            matches = [(path, CHUNK.fullmatch(path.name)) for path in self._files()]
+            others = [path for path, match in matches if match and int(match[1]) >= first]
+            for path in others:
+                path.unlink(missing_ok=True)
+            if others:
+                sync(self._folder)
 
     def clear(self) -> None:
         """Remove the chunks: the finished artefact holds them."""

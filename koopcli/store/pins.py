@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from koopcli.errors import UnknownNameError
-from koopcli.store.files import publish, reading_errors, storage_errors
+from koopcli.store.files import publish, reading_errors, storage_errors, sync_young
 from koopcli.store.records import Record
 from koopcli.store.store import Store
 from koopcli.store.survey import pinned
@@ -17,7 +17,10 @@ from koopcli.text import printable
 def pin(store: Store, label: str, records: Sequence[Record]) -> None:
     """Keep ``records`` under ``label``; writes nothing when they are there already."""
     names = sorted(f"{record.stage}/{record.key}" for record in records)
+    for record in records:
+        store.sync(record)
     if pins(store).get(label) == names:
+        sync_young(_path(store, label))
         return
     with storage_errors(store.root):
         content = json.dumps({"names": names}, indent=1).encode()

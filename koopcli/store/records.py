@@ -87,18 +87,34 @@ class Record:
         return record
 
 
+def whole_recipe(text: bytes, key: str) -> dict[str, Any] | None:
+    """The recipe in the text of a damaged record, if it still hashes to ``key``."""
+    try:
+        recipe = parse_json(text)["recipe"]
+        return dict(recipe) if _is_recipe(recipe) and key_of(recipe) == key else None
+    except (ValueError, KeyError, TypeError, InvalidValueError):
+        return None
+
+
 def _well_formed(record: Record) -> bool:
     """Whether each entry has its form: paths are made of them."""
     return (
-        all(isinstance(value, dict) for value in (record.recipe, record.lineage, record.provenance))
+        all(isinstance(value, dict) for value in (record.lineage, record.provenance))
         and all(isinstance(digest, str) and DIGEST.fullmatch(digest) for digest in (record.object, record.data))
         and type(record.size) is int
         and record.size >= 0
         and all(map(is_name, record.lineage.values()))
-        and isinstance(record.recipe.get("stage"), str)
-        and type(record.recipe.get("version")) is int
-        and all(isinstance(record.recipe.get(name), dict) for name in ("settings", "inputs"))
-        and all(isinstance(digest, str) and DIGEST.fullmatch(digest) for digest in record.recipe["inputs"].values())
+        and _is_recipe(record.recipe)
+    )
+
+
+def _is_recipe(recipe: object) -> bool:
+    return (
+        isinstance(recipe, dict)
+        and isinstance(recipe.get("stage"), str)
+        and type(recipe.get("version")) is int
+        and all(isinstance(recipe.get(name), dict) for name in ("settings", "inputs"))
+        and all(isinstance(digest, str) and DIGEST.fullmatch(digest) for digest in recipe["inputs"].values())
     )
 
 

@@ -11,6 +11,7 @@ import os
 import stat
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,7 @@ from koopcli.store.files import (
     sha256_file,
     storage_errors,
     sweep,
+    sync_young,
 )
 from koopcli.store.identity import data_digest
 from koopcli.store.locks import hold
@@ -151,6 +153,7 @@ class Store:
         record = Record(recipe, lineage, path.stem, size, digest, provenance)
         first = self.record(record.stage, record.key)
         if first is not None and self.has_object(first):
+            self.sync(first)
             return first
         with storage_errors(self.root):
             self._publish(self._record_path(record.stage, record.key), record.to_json())
@@ -206,6 +209,10 @@ class Store:
                 if record is not None and self.has_object(record):  # without its object it is being made again
                     self.parts(folder.name).clear()
 
+    def sync(self, record: Record) -> None:
+        """Make what another process has just committed last before it is named: that one may have been killed first."""
+        sync_young(self._record_path(record.stage, record.key), self.path(record))
+
     def inspect(self, record: Record) -> Packed:
         """The verified content, as :meth:`read` has it; a damaged object stays where it is.
 
@@ -229,9 +236,9 @@ class Store:
         """Move a damaged file to quarantine beside any earlier one; says what was done."""
         quarantine = self.root / "quarantine"
         try:
-            quarantine.mkdir(exist_ok=True)
-            taken = len(list(quarantine.glob(f"{path.name}*")))
-            os.replace(path, quarantine / (f"{path.name}.{taken}" if taken else path.name))
+            make_folder(quarantine)
+            names = (f"{path.name}.{number}" if number else path.name for number in count())
+            os.replace(path, next(quarantine / name for name in names if not os.path.lexists(quarantine / name)))
         except OSError:
             return "and cannot be put aside in a read-only store"
         return "and was put aside"

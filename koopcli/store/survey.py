@@ -14,12 +14,13 @@ from koopcli.progress import Progress, silent
 from koopcli.store.files import UntrustedFileError, read_small, reading_errors
 from koopcli.store.names import STAGE, is_name
 from koopcli.store.parts import CHUNK
-from koopcli.store.records import BadRecordError, Record
+from koopcli.store.records import BadRecordError, Record, whole_recipe
 
 DIGEST = "[0-9a-f]{64}"
 WRITER = r"\d+-[0-9a-f]{16}@.+"  # the process that writes or removes a file
 RECORD = re.compile(rf"({DIGEST})\.json")
 OBJECT = re.compile(rf"({DIGEST})\.h5")
+PUT_ASIDE = re.compile(rf"({DIGEST})\.json(\.\d+)?")
 REMOVING = re.compile(rf"({DIGEST})\.h5\.{WRITER}")
 FOLDERS = ("objects", "records", "partial", "refs", "locks", "tmp", "quarantine", "reports")
 BESIDE = ("README.md", ".gitignore")  # what a checkout keeps in its store
@@ -64,6 +65,8 @@ class Stock:
     locks: list[File] = field(default_factory=list)
     temporary: list[File] = field(default_factory=list)
     quarantine: list[File] = field(default_factory=list)
+    lost: dict[str, Recorded] = field(default_factory=dict)
+    """Damaged records in quarantine whose recipe is whole, as long as no good record has their name."""
     foreign: list[File] = field(default_factory=list)
 
     def named_by(self) -> dict[str, list[Recorded]]:
@@ -102,6 +105,10 @@ def survey(root: Path, progress: Progress = silent) -> Stock:
         ):
             for entry in _entries(root / name):
                 _add(files if re.fullmatch(pattern, entry.name, re.S) else stock.foreign, entry)
+        for recorded in filter(None, map(_put_aside, stock.quarantine)):
+            known = stock.records.get(recorded.full)
+            if known is None or known.damaged:
+                stock.lost[recorded.full] = recorded
     return stock
 
 
@@ -146,6 +153,21 @@ def look(path: Path, stage: str, key: str) -> Recorded | None:
         return Recorded(file, stage, key, None, True, text)
     except NewerFormatError:
         return Recorded(file, stage, key, None, False, text)
+
+
+def _put_aside(file: File) -> Recorded | None:
+    """The damaged record that a file in quarantine is, if its recipe is whole."""
+    match = PUT_ASIDE.fullmatch(file.path.name)
+    if match is None:
+        return None
+    try:
+        text = read_small(file.path)
+    except (OSError, UntrustedFileError):
+        return None
+    recipe = whole_recipe(text, match[1])
+    if recipe is None or not is_name(f"{recipe['stage']}/{match[1]}"):
+        return None
+    return Recorded(file, recipe["stage"], match[1], None, True, text)
 
 
 def pinned(root: Path, foreign: list[File] | None = None) -> dict[str, list[str] | None]:

@@ -18,6 +18,7 @@ from koopcli.store.survey import Recorded, Stock, object_path, survey
 
 DAMAGE = (
     "damaged record",
+    "record put aside",
     "damaged object",
     "unreadable object",
     "missing object",
@@ -84,6 +85,9 @@ def _records(store: Store, stock: Stock) -> Iterator[Finding]:
             for role, name in recorded.record.lineage.items():
                 if name not in stock.records:
                     yield Finding("input gone", path, f"its {role}, {short_name(name)}, is no longer here", full)
+    for full, recorded in stock.lost.items():
+        what = "it was damaged, its recipe is whole: remove the file to give the artefact up"
+        yield Finding("record put aside", _relative(store, recorded.file.path), what, full)
 
 
 @dataclass

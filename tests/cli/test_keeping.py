@@ -129,6 +129,45 @@ def test_damage_is_found_without_a_touch_and_repaired(koop, folder, made, kind):
     assert {name: json.loads(record.read_text())["data"] for name, (record, _) in files(folder).items()} == digests
 
 
+def test_records_that_a_command_put_aside_are_repaired(koop, folder, made):
+    """`koop ls` moves damaged records away, with the recipes that a repair needs."""
+    root = folder / "artefacts"
+    names = {row["name"] for row in json.loads(koop("ls", "--json").out)}
+    for record, _ in made.values():
+        record.write_text(record.read_text().replace('"check": "', '"check": "0'))
+    assert koop("ls").err.count("put aside") == 3
+    assert not list((root / "records").rglob("*.json"))
+    for options in ([], ["--fast"]):
+        found = koop("verify", "--json", *options)
+        assert found.code == 5
+        lost = [one for one in findings(found) if one["damage"]]
+        assert [one["kind"] for one in lost] == ["record put aside"] * 3
+        assert {one["name"] for one in lost} == names
+        assert all(one["path"].startswith("quarantine/") for one in lost)
+    mended = koop("verify", "--repair")
+    assert mended.code == 0
+    assert "3 repaired" in mended.out
+    assert koop("verify").code == 0
+    assert read_all(root) == 3
+    assert len(list((root / "quarantine").iterdir())) == 3
+
+
+def test_a_repair_that_was_cut_off_goes_on(koop, made, monkeypatch):
+    from koopcli.stages.pipeline import Pipeline
+
+    made["fit-edmd"][0].write_text(made["fit-edmd"][0].read_text().replace('"check": "', '"check": "0'))
+
+    def cut_off(*args):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Pipeline, "make", cut_off)
+        assert koop("verify", "--repair").code == 130
+    assert not made["fit-edmd"][0].exists()
+    assert "1 repaired" in koop("verify", "--repair").out
+    assert made["fit-edmd"][0].exists()
+
+
 def test_what_the_fast_check_sees(koop, made):
     flip(made["sample"][1])
     assert koop("verify", "--fast").code == 0

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from koopcli.cli.outputs import write_outputs
+from koopcli.console import Console
 from tests.cli.test_errors import one_line
+from tests.powercut.disk import disk_of, operations, states
+from tests.powercut.recorder import Events, recording
 
 SWEEP = ["sweep", "--set", "fit-edmd.order=1,2"]
 
@@ -21,3 +25,15 @@ def test_stdout_takes_one_thing(koop, folder):
         one_line(koop(*command, "--csv", "-", "--json"), 2, "--csv - and --json")
     one_line(koop("show", "evaluate/0", "--csv", "--json"), 2, "--csv and --json")
     assert not (folder / "artefacts").exists()
+
+
+def test_a_power_cut_leaves_the_users_file_as_it_was_or_whole(tmp_path):
+    path = tmp_path / "map.png"
+    path.write_bytes(b"what was there")
+    start, events = disk_of(tmp_path), Events()
+    with recording(tmp_path, events):
+        write_outputs(Console(), b"what is new", path, None, None)
+    done = operations(start, events, tmp_path)
+    kept = [{state.tree["map.png"] for state in states(start, done[:cut])} for cut in range(len(done) + 1)]
+    assert set().union(*kept) == {b"what was there", b"what is new"}
+    assert kept[-1] == {b"what is new"}

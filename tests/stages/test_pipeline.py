@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import errno
+import os
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -17,6 +19,7 @@ from koopcli.stages.pipeline import Pipeline
 from koopcli.stages.registry import STAGES
 from koopcli.store import Store
 from koopcli.vehicles.plants.forces import Forces
+from tests.powercut.recorder import Events, recording
 
 SMALL = ["sample.count=5", "sample.columns=2", "fit-edmd.order=2", "test.count=40", "test.steps=5", "evaluate.chunk=10"]
 
@@ -99,6 +102,27 @@ def test_a_hit_writes_nothing_and_needs_nothing_upstream(fresh, store):
     before = {path: path.stat().st_mtime_ns for path in store.root.rglob("*")}
     assert fresh()[0].make(recipes.evaluation(experiment())).record == made.record
     assert {path: path.stat().st_mtime_ns for path in store.root.rglob("*")} == before
+
+
+def test_a_hit_is_synced_before_it_is_announced(fresh, store):
+    """Who made it may have been killed before that."""
+    made = fresh()[0].make(recipes.fit_edmd(experiment())).record
+    line, heard = fresh()
+    events = Events()
+    with recording(store.root, events):
+        heard.note = lambda text: events.add(("say", text))
+        line.make(recipes.fit_edmd(experiment()))
+    assert events[-2:] == [("sync", str(store.root / "records" / "fit-edmd")), ("say", f"{made.name:<24} reused")]
+
+
+def test_a_hit_that_cannot_be_synced_is_served(fresh, monkeypatch):
+    made = fresh()[0].make(recipes.fit_edmd(experiment()))
+
+    def refuse(*args):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    assert fresh()[0].make(recipes.fit_edmd(experiment())).record == made.record
 
 
 def test_a_damaged_object_is_put_aside_and_made_again(fresh, store):

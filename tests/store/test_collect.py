@@ -15,6 +15,7 @@ from koopcli.store.collect import plan, remove
 from koopcli.store.files import DAY, make_folder
 from koopcli.store.identity import SCHEMA
 from koopcli.store.pins import pin, unpin
+from koopcli.store.verify import verify
 from tests.store.test_store import packed
 
 WEEK = 7 * DAY
@@ -169,6 +170,38 @@ def test_what_does_not_read_here_keeps_what_it_names(store):
     assert path.exists()
     assert not record_path(store, base).exists()  # nothing names it any more
     assert store.path(newer).exists()
+
+
+def put_aside(store, record):
+    """Damage the record in place, and let a command meet it."""
+    path = record_path(store, record)
+    path.write_text(path.read_text().replace('"check"', '"Check"'))
+    assert store.record(record.stage, record.key) is None
+
+
+def test_what_was_put_aside_and_can_be_made_again_keeps_what_it_was_made_from(store):
+    base = commit(store, 1, days=30)
+    lost = commit(store, 2, stage="simulate", of=base, days=30)
+    gone = commit(store, 3, days=30)
+    put_aside(store, lost)
+    planned = plan(store, 0, delete=True)
+    assert planned.kept == 1
+    assert [one.name for one in remove(store, planned)] == [gone.name]
+    assert there(store) == {base.key}
+    (aside,) = (store.root / "quarantine").iterdir()
+    aside.unlink()
+    collected(store)
+    assert there(store) == set()
+
+
+def test_what_is_removed_is_not_taken_for_lost(store):
+    """Its record had once been put aside, and it was made again."""
+    put_aside(store, commit(store, 1))
+    commit(store, 1, days=30)
+    assert len(collected(store)) == 1
+    assert there(store) == set()
+    assert verify(store, None).findings == ()
+    assert len(list((store.root / "quarantine").iterdir())) == 1
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"names": 3}', '{"names": ["sample"]}', '{"names": [3]}'])

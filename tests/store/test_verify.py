@@ -12,6 +12,7 @@ import pytest
 from koopcli.errors import StorageError
 from koopcli.store import Store
 from koopcli.store import store as store_module
+from koopcli.store.identity import key_of
 from koopcli.store.survey import survey
 from koopcli.store.verify import verify
 from tests.store.test_store import commit
@@ -128,6 +129,49 @@ def test_a_record_that_is_a_link_or_nonsense(store, tmp_path):
         path.write_text(text)
         assert kinds(verify(store, look)) == ["damaged record", "orphan object"]
     assert not (store.root / "quarantine").exists()
+
+
+def test_a_record_that_was_put_aside_is_lost_until_another_has_its_name(store):
+    record = commit(store)
+    path = store.root / "records" / "sample" / f"{record.key}.json"
+    good = path.read_text()
+    for number in range(3):  # the third time nothing is left of the recipe
+        path.write_text(good.replace('"check"', '"Check"') if number < 2 else good.replace('"width"', '"Width"'))
+        assert store.record("sample", record.key) is None
+    names = {f"{record.key}.json", f"{record.key}.json.1", f"{record.key}.json.2"}
+    assert {aside.name for aside in (store.root / "quarantine").iterdir()} == names
+    lost, orphan = verify(store, look).findings
+    assert (lost.kind, lost.artefact, lost.damage) == ("record put aside", f"sample/{record.key}", True)
+    assert orphan.kind == "orphan object"
+    path.write_text("{")
+    assert kinds(verify(store, look)) == ["damaged record", "record put aside", "orphan object"]
+    path.write_text(good)
+    assert verify(store, look).findings == ()
+    path.unlink()
+    for name in names:
+        (store.root / "quarantine" / name).unlink()
+    assert kinds(verify(store, look)) == ["orphan object"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        '{"recipe": 3}',
+        '{"recipe": {"stage": "sample", "version": 1, "settings": {}, "inputs": {"of": "x"}}}',
+        '{"recipe": {"stage": "../x", "version": 1, "settings": {}, "inputs": {}}}',
+    ],
+)
+def test_what_else_lies_in_quarantine_is_no_recipe(store, text):
+    recipe = json.loads(text or "{}")
+    key = key_of(recipe["recipe"]) if "recipe" in recipe else "0" * 64
+    (store.root / "quarantine").mkdir(parents=True)
+    (store.root / "quarantine" / f"{key}.json").write_text(text)
+    os.mkfifo(store.root / "quarantine" / f"{'1' * 64}.json")
+    report = verify(store, look)
+    assert report.quarantine == 2
+    assert report.findings == ()
 
 
 def test_the_survey_of_nothing(tmp_path):
