@@ -65,8 +65,19 @@ def commit(chunk: Chunk) -> list[str]:
     store = _store(chunk.root)
     store.warn = warned.append
     with suppress(_GoneError):
-        store.parts(chunk.key).commit(chunk.i, chunk.compute())
+        store.parts(chunk.key).commit(chunk.i, _computed(chunk))
     return warned
+
+
+def _computed(chunk: Chunk) -> Packed:
+    """What a chunk makes. An input of another process that turns out damaged while it is read is one that is gone."""
+    try:
+        return chunk.compute()
+    except DamagedArtefactError as error:
+        if chunk.at_hand is not None:
+            raise
+        _content_of.cache_clear()
+        raise _GoneError from error
 
 
 @dataclass

@@ -184,6 +184,17 @@ class Pipeline:
         return content
 
     def _build(self, task: Task) -> tuple[Record, Any, bool]:
+        """Make ``task``, again where a large input turned out damaged while it was read."""
+        try:
+            return self._build_once(task)
+        except DamagedArtefactError as error:
+            inputs = [self._known(upstream) for _, upstream in task.inputs]
+            if all(record is None or self.store.has_object(record) for record in inputs):
+                raise
+            self.reporter.warn(f"{error}; making it again")
+            return self._build_once(task)
+
+    def _build_once(self, task: Task) -> tuple[Record, Any, bool]:
         """Make ``task`` under its lock, unless another process has just done so."""
         stage = STAGES[task.stage]
         self.store.require(cost(task).bytes)  # before anything is made for it

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from koopcli.errors import DamagedArtefactError, StorageError
 from koopcli.progress import Progress, silent
+from koopcli.store.digests import slabs_path
 from koopcli.store.files import DAY, HOUR, make_folder, own_name, storage_errors
 from koopcli.store.locks import if_free
 from koopcli.store.store import Store
@@ -67,7 +68,7 @@ def plan(store: Store, grace: float, *, delete: bool = False, progress: Progress
             f"the pin {damaged[0]} is damaged and what it keeps unknown, so nothing is removed: "
             f"koop unpin {damaged[0]}, and pin again what is to stay"
         )
-    if not any((stock.objects, stock.removing, stock.records, stock.chunks, stock.locks, stock.temporary)):
+    if not any((stock.objects, stock.slabs, stock.removing, stock.records, stock.chunks, stock.locks, stock.temporary)):
         return CollectionPlan((), 0, stock)
     now, clock = _clock(store, stock, delete)
     kept = _kept(stock, now - grace)
@@ -169,7 +170,7 @@ def _artefacts(store: Store, stock: Stock, kept: set[str], before: float) -> Ite
     if any(recorded.record is None for recorded in stock.records.values()):
         return  # what looks like an orphan may belong to a record that does not read here
     used = wanted | stock.named_by().keys()
-    for digest, file in stock.objects.items():
+    for digest, file in {**stock.slabs, **stock.objects}.items():
         if digest not in used and file.mtime < before:
             yield Removal("orphan object", _relative(store, file), file.size, (file,), (digest,))
 
@@ -250,15 +251,16 @@ def _remove_files(store: Store, removal: Removal) -> bool:
 
 def _remove_objects(store: Store, digests: set[str], stock: Stock) -> set[str]:
     """Remove objects that no record names; returns those that are still there."""
-    away: dict[str, Path] = {}
+    away: list[tuple[str, Path]] = []
     suffix = own_name()
     for digest in sorted(digests):
-        path = object_path(store.root, digest)
-        with suppress(FileNotFoundError):
-            if _untouched(store, digest, stock):
-                aside = path.with_name(f"{path.name}.{suffix}")
-                os.replace(path, aside)
-                away[digest] = aside
+        if _untouched(store, digest, stock):
+            path = object_path(store.root, digest)
+            for file in (path, slabs_path(path)):
+                with suppress(FileNotFoundError):
+                    aside = file.with_name(f"{file.name}.{suffix}")
+                    os.replace(file, aside)
+                    away.append((digest, aside))
     _settle(store, away)
     return {digest for digest in digests if object_path(store.root, digest).exists()}
 
@@ -273,15 +275,15 @@ def _untouched(store: Store, digest: str, stock: Stock) -> bool:
     return then is not None and (about.st_size, about.st_mtime) == (then.size, then.mtime)
 
 
-def _settle(store: Store, away: dict[str, Path]) -> None:
-    """Put objects that were moved away back where a record names them, and remove the others."""
+def _settle(store: Store, away: Sequence[tuple[str, Path]]) -> None:
+    """Put files of objects that were moved away back where a record names them, and remove the others."""
     if not away:
         return
     named = {digest for recorded in records(store.root).values() for digest in _named(recorded)}
-    for digest, aside in away.items():
+    for digest, aside in away:
         with suppress(FileNotFoundError):
             if digest in named:
-                os.replace(aside, object_path(store.root, digest))
+                os.replace(aside, aside.with_name(".".join(aside.name.split(".")[:2])))
             else:
                 aside.unlink()
 
@@ -289,7 +291,7 @@ def _settle(store: Store, away: dict[str, Path]) -> None:
 def _put_back(store: Store, stock: Stock) -> None:
     """End what a collection that was cut off had begun; one that is still at work meets nothing it does not expect."""
     for digest, file in stock.removing:
-        _settle(store, {digest: file.path})
+        _settle(store, [(digest, file.path)])
 
 
 def _free(lock: Path) -> bool:

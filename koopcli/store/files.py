@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import hashlib
 import io
 import os
 import resource
@@ -97,12 +96,6 @@ def publish(target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path]
 def own_name() -> str:
     """A name that no other process gives to a file, and that says which process gave it."""
     return f"{os.getpid()}-{secrets.token_hex(8)}@{socket.gethostname()}"
-
-
-def sha256_file(path: Path) -> str:
-    """The digest of a file, read in pieces."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @contextmanager

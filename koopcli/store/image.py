@@ -92,11 +92,12 @@ def loaded(packed: Packed) -> Packed:
 
 
 def from_open(opened: io.FileIO) -> Packed:
-    """The record of that very file, whatever its path leads to by now; arrays that are large stay on disk."""
+    """The record of that very file, whatever its path leads to by now; arrays that are large stay there."""
     with refusals():
-        refuse_other_formats(os.pread(opened.fileno(), SUPERBLOCK, 0))
-        # Not by its path: that may be another file by now, one as good, or none.
-        file = h5py.File(_Opened(os.dup(opened.fileno())), "r", locking=False)
+        start = bytearray(SUPERBLOCK)
+        opened.readinto(start)  # not read(), which verifies nothing
+        refuse_other_formats(start)
+        file = h5py.File(opened, "r", locking=False)
         try:
             if os.fstat(opened.fileno()).st_size > MEMORY_LIMIT:
                 return _packed(file)
@@ -119,7 +120,8 @@ def read_foreign(path: Path) -> Packed:
     """The record of a file that a user names. Raises ``InvalidValueError`` for one that koop would not have written."""
     try:
         with open_regular(path, 0) as (opened, size):
-            return from_open(opened) if size > MEMORY_LIMIT else from_bytes(opened.read())
+            # Not by its path: that may be another file by now, one as good, or none.
+            return from_open(_Opened(os.dup(opened.fileno()))) if size > MEMORY_LIMIT else from_bytes(opened.read())
     except UntrustedFileError as error:
         raise InvalidValueError(f"{printable(str(path))} cannot be used: {error}") from error
     except OSError as error:

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
+from typing import IO
 
 from koopcli.records import Packed
 from koopcli.store import image
 from koopcli.store.code import code_digest
+from koopcli.store.digests import sha256
 from koopcli.store.files import Published, UntrustedFileError, open_regular, storage_errors, sync
 
 HELD = 64 << 20  # bytes of the chunks of one artefact that are held in memory; others are read where they are needed
 CHUNK = re.compile(r"(\d+)-([0-9a-f]{64})(?:-([0-9a-f]{64}))?\.h5")  # number, digest, code, which was not told once
-Put = Callable[[Packed, Callable[[str], Path]], Published]
-"""Write a record durably to the path found from the digest of its bytes."""
+Put = Callable[[Packed, Callable[[IO[bytes]], Path]], Published]
+"""Write a record durably to the path found from its bytes."""
 
 
 class Parts:
@@ -48,7 +49,7 @@ class Parts:
 
     def commit(self, i: int, packed: Packed) -> None:
         """Store chunk ``i``."""
-        self._put(packed, lambda sha: self._folder / f"{i}-{sha}-{code_digest()}.h5")
+        self._put(packed, lambda file: self._folder / f"{i}-{sha256(file)}-{code_digest()}.h5")
 
     def drop_others(self) -> int:
         """Remove the chunks of other code, and those that do not say whose they are; returns how many those were."""
@@ -85,7 +86,7 @@ class Parts:
         """The chunk at ``path``, if it is what its name says."""
         try:
             with open_regular(path) as (file, size):
-                if hashlib.file_digest(file, "sha256").hexdigest() != digest:
+                if sha256(file) != digest:
                     return None
                 if size > self._room:
                     return image.from_path(path)

@@ -7,13 +7,14 @@ refs/ (pins)   locks/   tmp/   quarantine/
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 import stat
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, NoReturn
 
 from koopcli.errors import (
     DamagedArtefactError,
@@ -22,7 +23,7 @@ from koopcli.errors import (
 )
 from koopcli.paths import is_folder
 from koopcli.records import Packed
-from koopcli.store import image
+from koopcli.store import digests, image
 from koopcli.store.files import (
     Published,
     UntrustedFileError,
@@ -32,7 +33,6 @@ from koopcli.store.files import (
     read_small,
     reading_errors,
     refuse_on_full_disk,
-    sha256_file,
     storage_errors,
     sweep,
     sync_young,
@@ -112,9 +112,11 @@ class Store:
 
     def has_object(self, record: Record) -> bool:
         """Whether the object is there, as a file and not a link; a record without its object is a miss."""
+        path = self.path(record)
+        files = [path] if record.size <= digests.WHOLE else [path, digests.slabs_path(path)]
         try:
             with reading_errors(self.root):
-                return stat.S_ISREG(self.path(record).lstat().st_mode)
+                return all(stat.S_ISREG(file.lstat().st_mode) for file in files)
         except FileNotFoundError:
             return False
 
@@ -125,7 +127,7 @@ class Store:
             before = _identity(path)
             try:
                 with reading_errors(path):
-                    return _verified(path, record)
+                    return _verified(path, record, self._lost)
             except FileNotFoundError as error:
                 raise DamagedArtefactError(f"the object of {record.name} is missing") from error
             except UntrustedFileError as error:
@@ -149,7 +151,7 @@ class Store:
         Where locks do not hold, another process may have committed the same recipe meanwhile: the first record wins.
         """
         digest = data_digest(packed)
-        path, size, _ = self._put(packed, self._object_path, labels)
+        path, size, _ = self._put(packed, self._target, labels)
         record = Record(recipe, lineage, path.stem, size, digest, provenance)
         first = self.record(record.stage, record.key)
         if first is not None and self.has_object(first):
@@ -157,8 +159,8 @@ class Store:
             return first
         with storage_errors(self.root):
             self._publish(self._record_path(record.stage, record.key), record.to_json())
-        if not path.exists():  # a collection took it for an orphan just before its record was there
-            self._put(packed, self._object_path, labels)
+        if not self.has_object(record):  # a collection took it for an orphan just before its record was there
+            self._put(packed, self._target, labels)
         return record
 
     def folder(self) -> Path:
@@ -180,16 +182,29 @@ class Store:
         """The committed chunks of an unfinished artefact."""
         return Parts(self.root / "partial" / key, self._put)
 
-    def _put(self, packed: Packed, target: Callable[[str], Path], labels: image.Labels = image.NO_LABELS) -> Published:
-        """Write the image of ``packed`` to ``target(sha256)``, through memory unless it is large."""
+    def _put(
+        self, packed: Packed, target: Callable[[IO[bytes]], Path], labels: image.Labels = image.NO_LABELS
+    ) -> Published:
+        """Write the image of ``packed`` to where ``target`` says of its bytes, through memory unless it is large."""
         needed = image.data_bytes(packed)
         with storage_errors(self.root, needed):
             if needed <= image.IMAGE_LIMIT:
                 content = image.to_bytes(packed, labels)
-                return self._publish(target(hashlib.sha256(content).hexdigest()), content)
-            return self._publish(
-                lambda path: target(sha256_file(path)), lambda path: image.to_file(packed, path, labels)
-            )
+                return self._publish(target(io.BytesIO(content)), content)
+
+            def target_of(path: Path) -> Path:
+                with path.open("rb") as file:
+                    return target(file)
+
+            return self._publish(target_of, lambda path: image.to_file(packed, path, labels))
+
+    def _target(self, file: IO[bytes]) -> Path:
+        """Where the object with the bytes of a ``file`` belongs; the digests of a large one are there from now on."""
+        name, slabs = digests.named(file)
+        path = self._object_path(name)
+        if slabs:
+            publish(digests.slabs_path(path), slabs, self.root / "tmp")
+        return path
 
     def _publish(self, target: Path | Callable[[Path], Path], fill: bytes | Callable[[Path], None]) -> Published:
         """Publish a file; the first time, clear old litter by the file system's own clock."""
@@ -211,14 +226,22 @@ class Store:
 
     def sync(self, record: Record) -> None:
         """Make what another process has just committed last before it is named: that one may have been killed first."""
-        sync_young(self._record_path(record.stage, record.key), self.path(record))
+        path = self.path(record)
+        slabs = [digests.slabs_path(path)] if record.size > digests.WHOLE else []
+        sync_young(self._record_path(record.stage, record.key), *slabs, path)
 
     def inspect(self, record: Record) -> Packed:
         """The verified content, as :meth:`read` has it; a damaged object stays where it is.
 
         Raises ``UntrustedFileError`` for a damaged one and ``FileNotFoundError`` for a missing one.
         """
-        return _verified(self.path(record), record)
+        return _verified(self.path(record), record, None)
+
+    def _lost(self, record: Record, file: io.FileIO) -> NoReturn:
+        """What is done when a large object turns out damaged while it is read."""
+        about, path = os.fstat(file.fileno()), self.path(record)
+        aside = self._put_aside(path) if _identity(path) == (about.st_dev, about.st_ino) else "no longer"
+        raise DamagedArtefactError(f"the object of {record.name} is damaged {aside}: {digests.WRONG}")
 
     def put_aside(self, path: Path) -> None:
         """Move a damaged file to quarantine. Raises ``StorageError`` where that cannot be done."""
@@ -253,13 +276,24 @@ def _identity(path: Path) -> tuple[int, int] | None:
     return about.st_dev, about.st_ino
 
 
-def _verified(path: Path, record: Record) -> Packed:
-    """The content of the one file that is opened, sized, hashed and walked. Raises ``UntrustedFileError``."""
+def _verified(path: Path, record: Record, lost: Callable[[Record, io.FileIO], NoReturn] | None) -> Packed:
+    """The content of the one file that is opened, sized, hashed and walked. Raises ``UntrustedFileError``.
+
+    What is not read at once of a large object is verified when it is read, and ``lost`` says what is done if it is
+    wrong; without that, all of it is verified here.
+    """
     with open_regular(path) as (file, size):
-        if size == record.size and size <= image.IMAGE_LIMIT:
+        if size != record.size:
+            raise UntrustedFileError(digests.WRONG)
+        if size <= digests.WHOLE:
             content = file.read()
-            if hashlib.sha256(content).hexdigest() == record.object:
-                return image.from_bytes(content)
-        elif size == record.size and hashlib.file_digest(file, "sha256").hexdigest() == record.object:
-            return image.from_open(file)
-    raise UntrustedFileError("its bytes are not those that were stored")
+            if hashlib.sha256(content).hexdigest() != record.object:
+                raise UntrustedFileError(digests.WRONG)
+            return image.from_bytes(content)
+        large = digests.VerifiedFile(os.dup(file.fileno()), digests.read_digests(path, record.object, size), size)
+    if lost is None:
+        large.verify()
+    packed = image.from_open(large)
+    if lost is not None:
+        large.refuse = lambda: lost(record, large)
+    return packed

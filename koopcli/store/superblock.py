@@ -18,7 +18,7 @@ LAST = ((2, 1, 14), (0, 2, 11), (1, 0, 25), (2, 1, 16), (0, 2, 4), (1, 0, 14), (
 HEAD = re.compile(rb"\x89HDF\r\n\x1a\n[\x02\x03]\x08\x08")  # places and lengths of 8 bytes
 
 
-def refuse_other_formats(start: bytes) -> None:
+def refuse_other_formats(start: bytes | bytearray) -> None:
     """Raise ``UntrustedFileError`` for a file that does not begin as one of format 1.8 or later does."""
     if not HEAD.match(start):
         raise UntrustedFileError("it is not HDF5 of format 1.8 or later")

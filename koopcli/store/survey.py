@@ -21,7 +21,8 @@ WRITER = r"\d+-[0-9a-f]{16}@.+"  # the process that writes or removes a file
 RECORD = re.compile(rf"({DIGEST})\.json")
 OBJECT = re.compile(rf"({DIGEST})\.h5")
 PUT_ASIDE = re.compile(rf"({DIGEST})\.json(\.\d+)?")
-REMOVING = re.compile(rf"({DIGEST})\.h5\.{WRITER}")
+SLABS = re.compile(rf"({DIGEST})\.slabs")
+REMOVING = re.compile(rf"({DIGEST})\.(?:h5|slabs)\.{WRITER}")
 FOLDERS = ("objects", "records", "partial", "refs", "locks", "tmp", "quarantine", "reports")
 BESIDE = ("README.md", ".gitignore")  # what a checkout keeps in its store
 
@@ -57,6 +58,8 @@ class Stock:
     """Every file of a store by what it is, as its name says."""
 
     objects: dict[str, File] = field(default_factory=dict)
+    slabs: dict[str, File] = field(default_factory=dict)
+    """The digests of the slabs of large objects, by the object's name."""
     removing: list[tuple[str, File]] = field(default_factory=list)
     records: dict[str, Recorded] = field(default_factory=dict)
     chunks: dict[str, list[File]] = field(default_factory=dict)
@@ -196,12 +199,15 @@ def _objects(root: Path, stock: Stock) -> None:
             continue
         for entry in _entries(Path(folder.path)):
             match, leaving = OBJECT.fullmatch(entry.name), REMOVING.fullmatch(entry.name)
+            slabs = SLABS.fullmatch(entry.name)
             files: list[File] = []
-            if entry.is_dir() or not entry.name.startswith(folder.name) or not (match or leaving):
+            if entry.is_dir() or not entry.name.startswith(folder.name) or not (match or slabs or leaving):
                 _add(stock.foreign, entry)
             elif _add(files, entry):
                 if match:
                     stock.objects[match[1]] = files[0]
+                elif slabs:
+                    stock.slabs[slabs[1]] = files[0]
                 elif leaving:
                     stock.removing.append((leaving[1], files[0]))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from pathlib import Path
 
 from koopcli.progress import Progress, silent
 from koopcli.records import Packed
+from koopcli.store.digests import named
 from koopcli.store.files import HOUR, UntrustedFileError, open_regular, size_text
 from koopcli.store.names import short_name
 from koopcli.store.records import Record
@@ -150,7 +150,7 @@ class _Objects:
         with open_regular(path) as (file, size):
             if self.opens is not None:
                 self.read += size
-                if hashlib.file_digest(file, "sha256").hexdigest() != digest:
+                if named(file)[0] != digest:
                     return "damaged object", "its bytes do not match its name; no record names it"
         return "orphan object", f"{size_text(size)} that no record names: see koop gc"
 
@@ -174,6 +174,9 @@ def _beside(store: Store, stock: Stock) -> Iterator[Finding]:
         if key in finished:
             what = f"{len(files)} chunks of a finished artefact: the next command clears them"
             yield Finding("orphan chunks", f"partial/{key}", what, finished[key])
+    for digest in sorted(stock.slabs.keys() - stock.objects.keys() - users.keys()):
+        path = _relative(store, stock.slabs[digest].path)
+        yield Finding("orphan object", path, "the digests of an object that is not here: see koop gc")
     for _, file in stock.removing:
         yield Finding("half-removed object", _relative(store, file.path), "a `koop gc` was cut off here: run it again")
     now = max(time.time(), stock.newest())  # only to tell a file at work from litter

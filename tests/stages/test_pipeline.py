@@ -15,9 +15,11 @@ from koopcli.koopman.scores import evaluation
 from koopcli.progress import silent
 from koopcli.records import Array, Packed
 from koopcli.stages import read, recipes
+from koopcli.stages.chunks import Chunk, commit
 from koopcli.stages.pipeline import Pipeline
 from koopcli.stages.registry import STAGES
-from koopcli.store import Store
+from koopcli.store import Store, digests, image
+from koopcli.store.code import code_digest
 from koopcli.vehicles.plants.forces import Forces
 from tests.powercut.recorder import Events, recording
 
@@ -123,6 +125,50 @@ def test_a_hit_that_cannot_be_synced_is_served(fresh, monkeypatch):
 
     monkeypatch.setattr(os, "fsync", refuse)
     assert fresh()[0].make(recipes.fit_edmd(experiment())).record == made.record
+
+
+def damage(store, record):
+    """One wrong byte in the values of the object of ``record``."""
+    path = store.path(record)
+    content = bytearray(path.read_bytes())
+    content[-100] ^= 1
+    path.write_bytes(content)
+
+
+@pytest.fixture
+def on_disk(monkeypatch):
+    """Every object is large, and read where a stage reads it."""
+    monkeypatch.setattr(digests, "SLAB", 1 << 10)
+    for module, limit in ((digests, "WHOLE"), (image, "IMAGE_LIMIT"), (image, "MEMORY_LIMIT")):
+        monkeypatch.setattr(module, limit, 0)
+
+
+def test_damage_that_a_stage_meets_while_it_reads_is_made_again(fresh, store, on_disk):
+    pipeline, _ = fresh()
+    task = recipes.fit_edmd(experiment())
+    trajectories = pipeline.make(task.input("trajectories")).record
+    damage(store, trajectories)
+    pipeline, heard = fresh()
+    made = pipeline.make(task)
+    assert store.has_object(trajectories)
+    (warning,) = heard.warnings
+    assert warning.startswith(f"the object of {trajectories.name} is damaged and was put aside")
+    assert warning.endswith("making it again")
+    assert made.figures["functions"] == 27
+
+
+def test_damage_that_a_worker_meets_leaves_the_chunk_to_the_command(fresh, store, on_disk):
+    pipeline, _ = fresh()
+    task = recipes.evaluation(experiment())
+    inputs = {role: pipeline.make(upstream).record for role, upstream in task.inputs}
+    lineage = tuple((role, f"{record.stage}/{record.key}") for role, record in inputs.items())
+    chunk = Chunk(store.root, "evaluate", task.settings, "0" * 64, lineage, 1, 10, 20, code=code_digest())
+    assert commit(chunk) == []
+    assert store.parts("0" * 64).read([1])
+    damage(store, inputs["trajectories"])
+    assert commit(replace(chunk, i=2)) == []  # what this process has read stays good
+    assert commit(replace(chunk, i=3, start=30, stop=40)) == []
+    assert list(store.parts("0" * 64).read([1, 2, 3])) == [1, 2]
 
 
 def test_a_damaged_object_is_put_aside_and_made_again(fresh, store):

@@ -6,7 +6,7 @@ Usage: python -m tests.store.fuzzing <folder> <first seed> <count>
 from __future__ import annotations
 
 import faulthandler
-import hashlib
+import io
 import random
 import sys
 from collections.abc import Callable
@@ -17,7 +17,7 @@ import numpy as np
 
 from koopcli.errors import DamagedArtefactError, InvalidValueError
 from koopcli.records import Packed
-from koopcli.store import Record, Store, image
+from koopcli.store import Record, Store, digests, image
 from tests.store.checksums import sums, with_sums
 from tests.store.hostile import describe, put_facts
 
@@ -59,17 +59,18 @@ def main(folder: Path, first: int, count: int) -> None:
     faulthandler.enable()
     store = Store(folder / "store")
     known = [(source, sums(source)) for source in sources()]
-    usual = image.IMAGE_LIMIT, image.MEMORY_LIMIT
+    usual = digests.WHOLE, image.MEMORY_LIMIT
     refused = 0
     for seed in range(first, first + count):
         chance = random.Random(seed)
         content = changed(*known[seed % 2], chance)
-        image.IMAGE_LIMIT, image.MEMORY_LIMIT = chance.choice((usual, (0, 0)))
-        digest = hashlib.sha256(content).hexdigest()
+        digests.WHOLE, image.MEMORY_LIMIT = chance.choice((usual, (0, 0)))
+        digest, slabs = digests.named(io.BytesIO(content))
         record = Record({"stage": "sample", "seed": seed}, {}, digest, len(content), digest, {})
         path = store.path(record)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
+        digests.slabs_path(path).write_bytes(slabs)
         (folder / "seed").write_text(f"{seed}")
         faulthandler.dump_traceback_later(20, exit=True)
         outcome = (

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-import hashlib
+import io
 import os
 import subprocess
 import sys
@@ -12,7 +12,7 @@ import pytest
 
 from koopcli.errors import DamagedArtefactError, InvalidValueError
 from koopcli.records import Array, Packed
-from koopcli.store import Record, Store, image
+from koopcli.store import Record, Store, digests, image
 from koopcli.store.files import UntrustedFileError, open_regular, read_small
 from koopcli.store.identity import SCHEMA
 from koopcli.store.pins import pins
@@ -47,17 +47,18 @@ def shelf(tmp_path_factory, token) -> Path:
 def large(request, monkeypatch) -> None:
     """Files of any size are read in the way of small ones, of those between, of large ones."""
     if request.param != "in memory":
-        monkeypatch.setattr(image, "IMAGE_LIMIT", 0)
+        monkeypatch.setattr(digests, "WHOLE", -1)
     if request.param == "on disk":
         monkeypatch.setattr(image, "MEMORY_LIMIT", 0)
 
 
 def dropped(store: Store, content: bytes) -> Record:
     """A record that is right in all but what its object is."""
-    digest = hashlib.sha256(content).hexdigest()
+    digest, slabs = digests.named(io.BytesIO(content))
     record = Record(RECIPE, {}, digest, len(content), digest, {})
     path = store.root / "records" / "sample" / f"{record.key}.json"
-    for file, what in ((path, record.to_json()), (store.path(record), content)):
+    beside = digests.slabs_path(store.path(record))
+    for file, what in ((path, record.to_json()), (store.path(record), content), (beside, slabs)):
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(what)
     found = store.record("sample", record.key)

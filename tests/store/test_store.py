@@ -17,7 +17,7 @@ from koopcli.errors import (
     UnknownNameError,
 )
 from koopcli.records import Array, Packed
-from koopcli.store import Store, image
+from koopcli.store import Store, digests, image
 from koopcli.store import parts as parts_module
 from koopcli.store.code import code_digest
 from koopcli.store.files import make_folder, publish, size_text, sweep
@@ -86,6 +86,7 @@ def test_a_flipped_bit_is_found_and_the_object_put_aside(store, where):
 def test_large_content_goes_through_a_file(store, monkeypatch, large):
     if large:
         monkeypatch.setattr(image, "IMAGE_LIMIT", 100)
+        monkeypatch.setattr(digests, "WHOLE", 100)
     record = store.commit(recipe(), {}, packed(n=10_000), {})
     assert store.path(record).stem == record.object
     assert (store.read(record).arrays["x"].values[...] == 1).all()
@@ -375,8 +376,8 @@ def test_what_others_have_put_right_is_not_put_aside(store, monkeypatch, what):
 
 
 def test_a_large_object_is_read_though_it_is_replaced_or_removed_meanwhile(store, monkeypatch):
-    monkeypatch.setattr(image, "IMAGE_LIMIT", 100)
-    monkeypatch.setattr(image, "MEMORY_LIMIT", 100)
+    for module, limit in ((image, "IMAGE_LIMIT"), (image, "MEMORY_LIMIT"), (digests, "WHOLE")):
+        monkeypatch.setattr(module, limit, 100)
     record = store.commit(recipe(), {}, packed(n=10_000), {})
     real = image.from_open
 
