@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,6 +22,7 @@ from koopcli.stages.pipeline import Pipeline
 from koopcli.stages.recorded import recipe_of
 from koopcli.stages.registry import STAGES
 from koopcli.store import Record, Store
+from koopcli.store.digests import named
 from koopcli.store.files import UntrustedFileError, open_regular, read_small
 from koopcli.store.identity import key_of
 from koopcli.store.records import whole_recipe
@@ -103,7 +103,7 @@ def _still_damaged(path: Path) -> bool:
         return recorded is not None and recorded.damaged
     try:
         with open_regular(path) as (file, _):
-            return hashlib.file_digest(file, "sha256").hexdigest() != path.stem
+            return named(file)[0] != path.stem
     except FileNotFoundError:
         return False
     except (OSError, UntrustedFileError):
