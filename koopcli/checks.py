@@ -6,11 +6,12 @@ import math
 import sys
 import types
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, dataclass, is_dataclass
 from difflib import get_close_matches
+from functools import cache
 from typing import Any, Literal, Self, TypeVar, Union, get_args, get_origin
 
-from koopcli.choices import Choice, Values, choices, hints_of, names_of, taken, told, without_none
+from koopcli.choices import Choice, Values, choices, fields_of, hints_of, names_of, taken, told, without_none
 from koopcli.errors import InvalidValueError, KoopError, MisplacedError, UsageError
 
 T = TypeVar("T")
@@ -83,7 +84,7 @@ def build(cls: type[T], values: Mapping[str, object], origin: Origin = COMMAND_L
 def build_layers(cls: type[T], layers: Sequence[Layer], prefix: str = "", beside: Mapping[str, Any] | None = None) -> T:
     """As :func:`build`, from ``layers`` of which later ones win. ``beside`` them stand values of what is no setting."""
     values = {**_checked(cls, layers, prefix), **(beside or {})}
-    for f in fields(cls):  # type: ignore[arg-type]
+    for f in fields_of(cls):
         if f.name not in values and f.default is MISSING and f.default_factory is MISSING:
             raise InvalidValueError(layers[-1].origin.say(f"missing key '{prefix}{f.name}'"))
     return cls(**values)
@@ -209,7 +210,7 @@ def _checked(cls: type, layers: Sequence[Layer], prefix: str) -> Values:
                     layer.origin.say(f"unknown setting '{prefix}{key}'{candidates(key, names_of(cls))}")
                 )
     values: Values = {}
-    for f in fields(cls):
+    for f in fields_of(cls):
         if f.name in choices(cls):
             values |= _checked_choice(cls, f.name, layers, prefix)
             continue
@@ -238,8 +239,9 @@ def _checked_choice(cls: type, name: str, layers: Sequence[Layer], prefix: str) 
     return {name: choose(kinds, own, getattr(default, "kind", None), prefix, name, table=f"{name}.")}
 
 
+@cache
 def _own(cls: type) -> set[str]:
-    return {f.name for f in fields(cls)}
+    return {f.name for f in fields_of(cls)}
 
 
 def _elsewhere(name: str, key: str, section: str) -> str:
