@@ -50,6 +50,7 @@ def test_every_manoeuvre_has_a_source_and_a_mirror_image(name):
     assert (u[..., [2, 5]] >= 0).all()
 
 
+@pytest.mark.slow
 def test_step_steer_holds_its_lateral_acceleration():
     x, u, _ = drive("step-steer")
     (_, mirrored), _ = both_ways("step-steer")
