@@ -71,7 +71,9 @@ def test_the_double_lane_change_comes_to_the_next_lane_and_back():
 
 
 def test_sine_with_dwell_is_the_standards():
-    _, u, _ = drive("sine-with-dwell")
+    x, u, _ = drive("sine-with-dwell")
+    (_, mirrored), _ = both_ways("sine-with-dwell")
+    assert mirrored == pytest.approx(x * [1, -1, -1, 1, 1], rel=1e-6, abs=1e-6)
     steer, car = u[:, 0], vehicle_named("bmw-320i")
     peak = 6.5 * (car.l_f + car.l_r) * 0.3 * 9.81 / (80 / 3.6) ** 2
     assert steer.max() == pytest.approx(peak, rel=1e-3)
