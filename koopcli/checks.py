@@ -6,11 +6,23 @@ import math
 import sys
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, dataclass, is_dataclass
 from difflib import get_close_matches
+from functools import cache
 from typing import Any, Literal, NoReturn, Self, TypeVar, Union, get_args, get_origin
 
-from koopcli.choices import Choice, Values, choices, hints_of, names_of, taken, told, without_none, written
+from koopcli.choices import (
+    Choice,
+    Values,
+    choices,
+    fields_of,
+    hints_of,
+    names_of,
+    taken,
+    told,
+    without_none,
+    written,
+)
 from koopcli.errors import InvalidValueError, KoopError, MisplacedError, UsageError
 
 T = TypeVar("T")
@@ -83,7 +95,7 @@ def build(cls: type[T], values: Mapping[str, object], origin: Origin = COMMAND_L
 def build_layers(cls: type[T], layers: Sequence[Layer], prefix: str = "", beside: Mapping[str, Any] | None = None) -> T:
     """As :func:`build`, from ``layers`` of which later ones win. ``beside`` them stand values of what is no setting."""
     values = {**_checked(cls, layers, prefix), **(beside or {})}
-    for f in fields(cls):  # type: ignore[arg-type]
+    for f in fields_of(cls):
         if f.name not in values and f.default is MISSING and f.default_factory is MISSING:
             raise InvalidValueError(layers[-1].origin.say(f"missing key '{prefix}{f.name}'"))
     return cls(**values)
@@ -226,7 +238,7 @@ def _checked(cls: type, layers: Sequence[Layer], prefix: str) -> Values:
             if key not in _own(cls) and key not in names_of(cls):
                 _refuse_unknown(key, names_of(cls), layer, prefix)
     values: Values = {}
-    for f in fields(cls):
+    for f in fields_of(cls):
         if f.name in choices(cls):
             values |= _checked_choice(cls, f.name, layers, prefix)
             continue
@@ -264,8 +276,9 @@ def _refuse_unknown(key: str, known: Iterable[str], layer: Layer, prefix: str) -
     raise layer.origin.misnamed(layer.origin.say(f"unknown setting '{prefix}{key}'{candidates(key, known)}"))
 
 
+@cache
 def _own(cls: type) -> set[str]:
-    return {f.name for f in fields(cls)}
+    return {f.name for f in fields_of(cls)}
 
 
 def _elsewhere(name: str, key: str, section: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Callable, Sequence
-from dataclasses import MISSING, field, fields, is_dataclass
+from dataclasses import MISSING, Field, field, fields, is_dataclass
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
@@ -82,14 +82,21 @@ def _once(of: Callable[[type], R]) -> Callable[[type], R]:
 
 
 @_once
+def fields_of(cls: type) -> tuple[Field[Any], ...]:
+    """The fields of a settings class."""
+    return fields(cls)
+
+
+@_once
 def hints_of(cls: type) -> dict[str, Any]:
     """The types of the fields of ``cls``."""
     return get_type_hints(cls)
 
 
+@_once
 def taken(cls: type) -> dict[str, str]:
     """The fields of a settings class that are no settings, each with the section that it is taken from."""
-    return {f.name: f.metadata["section"] for f in fields(cls) if "section" in f.metadata}
+    return {f.name: f.metadata["section"] for f in fields_of(cls) if "section" in f.metadata}
 
 
 @_once
@@ -102,7 +109,7 @@ def choices(cls: type) -> dict[str, type[Choice]]:
 @_once
 def names_of(cls: type) -> tuple[str, ...]:
     """The settings of ``cls`` and of all kinds that it can choose."""
-    own = [f.name for f in fields(cls) if "help" in f.metadata]
+    own = [f.name for f in fields_of(cls) if "help" in f.metadata]
     of_kinds = [name for base in choices(cls).values() for kind in base.kinds().values() for name in names_of(kind)]
     return tuple(dict.fromkeys([*own, *of_kinds]))
 
@@ -110,7 +117,7 @@ def names_of(cls: type) -> tuple[str, ...]:
 def written(settings: Any) -> Values:
     """Settings as plain values by their names: a choice by its kind, with the settings of that kind beside it."""
     values: Values = {"kind": settings.kind} if isinstance(settings, Choice) else {}
-    for f in fields(settings):
+    for f in fields_of(type(settings)):
         value = getattr(settings, f.name)
         if isinstance(value, Choice):
             own = written(value)
@@ -126,7 +133,7 @@ def essential(settings: Any) -> Values:
     What is added later with a default changes nothing here. The inverse is ``koopcli.checks.restored``.
     """
     values: Values = {"kind": settings.kind} if isinstance(settings, Choice) else {}
-    for f in fields(settings):
+    for f in fields_of(type(settings)):
         value = getattr(settings, f.name)
         if isinstance(value, Choice):
             own = essential(value)
@@ -146,7 +153,7 @@ def _essential(value: Any) -> Any:
 def told(settings: Any) -> Values:
     """As :func:`written`, the settings alone that are not at their defaults."""
     values: Values = {}
-    for f in fields(settings):
+    for f in fields_of(type(settings)):
         value = getattr(settings, f.name)
         if isinstance(value, Choice):
             values |= ({} if value.kind == getattr(f.default, "kind", "") else {f.name: value.kind}) | told(value)

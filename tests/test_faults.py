@@ -17,7 +17,10 @@ def test_killed_writers_lose_nothing(tmp_path, writers):
     assert (count.lost, count.accepted) == (0, 0)
 
 
-@pytest.mark.parametrize("code", [errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES])
+SELDOM = [pytest.param(code, marks=pytest.mark.slow) for code in (errno.EDQUOT, errno.EROFS, errno.EACCES)]
+
+
+@pytest.mark.parametrize("code", [errno.EIO, errno.ENOSPC, *SELDOM])
 def test_an_error_at_any_call_of_a_commit_leaves_the_old_state_or_the_new(tmp_path, code):
     count = errors(tmp_path, code)
     assert count.struck == count.injected >= 20

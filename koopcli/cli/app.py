@@ -23,17 +23,19 @@ COMMANDS = (
     Entry("simulate", "making", MAKE, "Simulate trajectories of a vehicle from a sample."),
     Entry(
         "fit-edmd",
-        "fitting",
+        "fit_edmd",
         MAKE,
         "Fit a Koopman predictor z⁺ = A z + B u, x̂ = C z by extended dynamic mode decomposition.",
     ),
     Entry(
         "fit-eigen",
-        "fitting",
+        "fit_eigen",
         MAKE,
         "Fit a Koopman predictor whose lifted states are eigenfunctions, built from trajectories without inputs.",
     ),
-    Entry("baseline", "fitting", MAKE, "Make a baseline: a prediction without any fit, which a predictor has to beat."),
+    Entry(
+        "baseline", "baseline", MAKE, "Make a baseline: a prediction without any fit, which a predictor has to beat."
+    ),
     Entry(
         "evaluate",
         "evaluating",

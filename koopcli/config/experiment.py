@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -38,7 +39,7 @@ DEFAULT_VEHICLE = "ctu-2020"
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # known by identity, as what follows from them is kept
 class Sections:
     """Raw values by section, where they came from, and the folder of relative paths in them."""
 
@@ -125,27 +126,11 @@ class Experiment:
         self, section: str, usual: str, vehicle: VehicleParameters | None = None, *, tables: bool = False
     ) -> SampleChoice:
         """The sample of a ``section``, of the ``usual`` kind unless the experiment names one."""
-        layers = [source.section(section) for source in self.sources]
-        if tables:
-            layers = [layer.only(lambda key, value: isinstance(value, Mapping)) for layer in layers]
-        kinds = KINDS[section]
-        kind = kinds[chosen_kind(kinds, layers, usual)]
-        plant = self.plant_for(kind.meant_for)
-        vehicle = vehicle or self.vehicle
-        values = {**vars(vehicle), **written(plant), "vehicle": plant.used(vehicle), "dt": self.simulate.dt}
-        beside = {name: values[name] for name in taken(kind)}
-        sample: SampleChoice = choose(kinds, layers, usual, f"{section}.", section, beside)
-        return sample
+        return _sample(self.sources, self.simulate, section, usual, vehicle or self.vehicle, tables)
 
     def plant_for(self, kind: type[PlantChoice]) -> PlantChoice:
         """The plant of a ``kind``, whichever is in effect, with what the experiment says of it."""
-        if isinstance(self.simulate.plant, kind):
-            return self.simulate.plant
-        names = {"plant", *names_of(kind)}
-        layers = [source.section("simulate").only(lambda key, value: key in names) for source in self.sources]
-        plant = build_layers(Simulate, [*layers, Layer({"plant": kind.kind})], beside={"vehicle": self.vehicle}).plant
-        assert plant is not None, "chosen"
-        return plant
+        return _plant(self.sources, self.simulate, kind.kind)
 
     def fit(self, section: str, **chosen: str) -> Any:
         """The settings of a fit with other kinds ``chosen``, which have what the experiment says of them in tables."""
@@ -164,6 +149,42 @@ class Experiment:
         """The experiment without a change of the command line."""
         changes = nested((setting, value) for setting, value in flat(self.sources[-1].values) if setting != name)
         return _experiment((*self.sources[:-1], replace(self.sources[-1], values=changes)))
+
+
+@lru_cache(maxsize=256)  # a reproduction asks for the same few thousands of times
+def _sample(
+    sources: tuple[Sections, ...],
+    simulate: Simulate,
+    section: str,
+    usual: str,
+    vehicle: VehicleParameters,
+    tables: bool,
+) -> SampleChoice:
+    """The sample of a ``section`` for a ``vehicle``, of the ``usual`` kind unless ``sources`` name one; of their
+    ``tables`` alone if so told.
+    """
+    layers = [source.section(section) for source in sources]
+    if tables:
+        layers = [layer.only(lambda key, value: isinstance(value, Mapping)) for layer in layers]
+    kinds = KINDS[section]
+    kind = kinds[chosen_kind(kinds, layers, usual)]
+    plant = _plant(sources, simulate, kind.meant_for.kind)
+    values = {**vars(vehicle), **written(plant), "vehicle": plant.used(vehicle), "dt": simulate.dt}
+    beside = {name: values[name] for name in taken(kind)}
+    sample: SampleChoice = choose(kinds, layers, usual, f"{section}.", section, beside)
+    return sample
+
+
+@lru_cache(maxsize=256)
+def _plant(sources: tuple[Sections, ...], simulate: Simulate, kind: str) -> PlantChoice:
+    """The plant of a ``kind``, whichever is in effect."""
+    if simulate.plant is not None and simulate.plant.kind == kind:
+        return simulate.plant
+    names = {"plant", *names_of(PlantChoice.kinds()[kind])}
+    layers = [source.section("simulate").only(lambda key, value: key in names) for source in sources]
+    plant = build_layers(Simulate, [*layers, Layer({"plant": kind})], beside={"vehicle": simulate.vehicle}).plant
+    assert plant is not None, "chosen"
+    return plant
 
 
 def load_experiment(name: str, changes: Changes) -> Experiment:

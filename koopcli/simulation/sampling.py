@@ -12,7 +12,7 @@ from koopcli.records import FloatArray
 
 SMALLEST_SHELL = 0.25  # radius of the innermost of several
 
-Draw = Callable[[np.random.Generator, float, int], FloatArray]
+Draw = Callable[["np.random.Generator", float, int], FloatArray]
 
 
 def _random(generator: np.random.Generator, half_width: float, count: int) -> FloatArray:

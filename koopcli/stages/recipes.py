@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import get_args
 
@@ -133,9 +134,14 @@ def mode_fits(fit: FitEigen, pairs: Sequence[int]) -> list[FitEigen]:
 def best_eigen(experiment: Experiment, budget: float | None = None) -> Experiment:
     """The experiment with the sample and the fit of best-eigen, for its own vehicle and period and its main budget."""
     main = experiment.reproduce.budgets[0]
-    best = load_experiment("best-eigen", {"sample": {"greedy": {"budget": main if budget is None else budget}}})
+    best = _best_eigen(main if budget is None else budget)
     simulate = replace(experiment.simulate, plant=None, steps=None)
     return replace(best, simulate=simulate, evaluate=experiment.evaluate)
+
+
+@cache
+def _best_eigen(budget: float) -> Experiment:
+    return load_experiment("best-eigen", {"sample": {"greedy": {"budget": budget}}})
 
 
 def side_by_side(experiment: Experiment) -> list[Task]:

@@ -9,7 +9,7 @@ from typing import Literal, get_args, get_origin, get_type_hints
 import pytest
 
 from koopcli.checks import build
-from koopcli.cli import evaluating, fitting, making
+from koopcli.cli import baseline, evaluating, fit_edmd, fit_eigen, making
 from koopcli.config import experiment
 from koopcli.config.changes import flat
 from koopcli.errors import KoopError
@@ -18,9 +18,9 @@ from koopcli.koopman.eigen.fit import FitEigen
 COMMANDS = (
     making.sample,
     making.simulate,
-    fitting.fit_edmd,
-    fitting.fit_eigen,
-    fitting.baseline,
+    fit_edmd.fit_edmd,
+    fit_eigen.fit_eigen,
+    baseline.baseline,
     evaluating.evaluate,
 )
 WRITTEN = {int: "007", float: ".5", bool: "true"}  # as an option takes it, but not TOML
@@ -66,7 +66,7 @@ def test_an_option_is_a_setting_by_another_name(command, changes_of):
         told = changes_of(command, **given)
         assert len(told) == len(given)
         words = [f"{name}={WRITTEN.get(type(v)) or (v[0] if isinstance(v, list) else v)}" for name, v in told.items()]
-        positional = {name: given[name] for name in ("kind",) if command is fitting.baseline}
+        positional = {name: given[name] for name in ("kind",) if command is baseline.baseline}
         same = changes_of(command, set_=words, **positional)
         for name, value in told.items():
             if isinstance(value, list):

@@ -43,12 +43,11 @@ def uninterrupted(tmp_path_factory) -> dict[str, str]:
 KILLS = (1, 4, 9, 20)  # chunks that are there; the later ones are of later stages, or the process is done before
 
 
-@pytest.mark.parametrize(
-    ("workers", "kills"), [(1, KILLS[2:3]), *(pytest.param(n, KILLS, marks=pytest.mark.slow) for n in (1, 2, 4))]
-)
-def test_killed_and_run_again_it_ends_the_same_whatever_the_workers(folder, uninterrupted, workers, kills):
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2, 4])
+def test_killed_and_run_again_it_ends_the_same_whatever_the_workers(folder, uninterrupted, workers):
     rng = random.Random(workers)
-    for there in kills:
+    for there in KILLS:
         process = start(folder, *SHARED, "--workers", str(workers))
         while chunks(folder) < there + rng.randrange(3) and process.poll() is None:
             time.sleep(0.002)

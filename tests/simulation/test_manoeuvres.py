@@ -50,6 +50,7 @@ def test_every_manoeuvre_has_a_source_and_a_mirror_image(name):
     assert (u[..., [2, 5]] >= 0).all()
 
 
+@pytest.mark.slow
 def test_step_steer_holds_its_lateral_acceleration():
     x, u, _ = drive("step-steer")
     (_, mirrored), _ = both_ways("step-steer")
@@ -70,7 +71,9 @@ def test_the_double_lane_change_comes_to_the_next_lane_and_back():
 
 
 def test_sine_with_dwell_is_the_standards():
-    _, u, _ = drive("sine-with-dwell")
+    x, u, _ = drive("sine-with-dwell")
+    (_, mirrored), _ = both_ways("sine-with-dwell")
+    assert mirrored == pytest.approx(x * [1, -1, -1, 1, 1], rel=1e-6, abs=1e-6)
     steer, car = u[:, 0], vehicle_named("bmw-320i")
     peak = 6.5 * (car.l_f + car.l_r) * 0.3 * 9.81 / (80 / 3.6) ** 2
     assert steer.max() == pytest.approx(peak, rel=1e-3)

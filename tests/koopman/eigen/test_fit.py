@@ -284,7 +284,10 @@ def test_the_cut_decides_the_figure(full, rank):
     assert figures["rmse"]["mean"] == pytest.approx(REFERENCE["ranks"][rank], rel=0.01)
 
 
-@pytest.mark.parametrize("vehicle", REFERENCE["baselines"])
+@pytest.mark.parametrize(
+    "vehicle",
+    [one if one == "ctu-2020" else pytest.param(one, marks=pytest.mark.slow) for one in REFERENCE["baselines"]],
+)
 def test_the_baselines(full, vehicle):
     training, test = full(vehicle), full(vehicle, seed=0)
     expected = REFERENCE["baselines"][vehicle]
