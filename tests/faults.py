@@ -1,7 +1,7 @@
 """Faults, counted: what a store loses, and what damage it takes for good, under each.
 
-The tests run these a few times; ``python -m tests.faults`` runs them at length and prints the table of
-docs/reliability.md.
+The tests run these a few times; ``python -m tests.faults`` runs them at length, power cuts during commands too, and
+prints the tables of docs/reliability.md.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import numpy as np
 
 from koopcli.errors import DamagedArtefactError, StorageError
 from koopcli.store import Record, Store, image
+from tests.powercut import commands
 from tests.writer import KEYS, commit, content
 
 UNFINISHED = "f" * 64
@@ -192,6 +193,7 @@ def main() -> None:
             row(f"{what} at the n-th open, write, fsync, rename, …", errors(work / str(code), code))
         for what, count in zip(("a bit flipped", "an end cut off"), damage(work, 3000, 2000), strict=True):
             row(f"{what} in an object", count)
+    commands.main([])
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import errno
 import pytest
 
 from tests.faults import damage, errors, kills
+from tests.powercut import commands
 
 
 @pytest.mark.slow
@@ -31,3 +32,12 @@ def test_every_flipped_bit_and_every_cut_is_found(tmp_path):
     flipped, cut = damage(tmp_path, 300, 200)
     assert (flipped.injected, flipped.struck, flipped.accepted) == (300, 300, 0)
     assert (cut.injected, cut.struck, cut.accepted) == (200, 200, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["pin", "gc --delete"])
+def test_a_power_cut_during_a_command_loses_nothing(name):
+    """Others: `make faults`. Power cuts of the store alone: tests/store/test_powercut.py."""
+    total = commands.count(name)
+    assert total["states"] > 100
+    assert (total["lost"], total["wrong"]) == (0, 0)

@@ -19,7 +19,7 @@ from koopcli.errors import (
 from koopcli.records import Packed
 from koopcli.stages.base import Reporter, Task
 from koopcli.stages.pipeline import Pipeline
-from koopcli.stages.recorded import recipe_of
+from koopcli.stages.recorded import recipe_of, settings_of
 from koopcli.stages.registry import STAGES
 from koopcli.store import Record, Store
 from koopcli.store.digests import named
@@ -44,8 +44,19 @@ def opens(record: Record, packed: Packed) -> tuple[str, str] | None:
         written, here = record.recipe["version"], stage.version
         if written != here:
             return "other version", f"laid out by version {written} of its stage, here {here}: make it afresh"
+        if not _known(record):
+            return "newer format", "made with settings that this koop does not know: update koop"
         return "damaged object", f"does not unpack ({' '.join(str(error).split())[:80]})"
     return None
+
+
+def _known(record: Record) -> bool:
+    """Whether this koop has the settings of ``record``, the kinds among them too."""
+    try:
+        settings_of(record)
+    except NewerFormatError:
+        return False
+    return True
 
 
 def repair(store: Store, reporter: Reporter, findings: Sequence[Finding]) -> list[Finding]:

@@ -156,7 +156,8 @@ def _named(recorded: Recorded) -> set[str]:
 
 def _artefacts(store: Store, stock: Stock, kept: set[str], before: float) -> Iterator[Removal]:
     """Records that nobody keeps, each with its object once no other record names it; then objects without any."""
-    wanted = {digest for full in kept for digest in _named(_recorded(stock)[full])}
+    recorded_by_name = _recorded(stock)
+    wanted = {digest for full in kept for digest in _named(recorded_by_name[full])}
     freed: set[str] = set()
     for full in sorted(stock.records.keys() - kept):
         recorded = stock.records[full]

@@ -152,7 +152,10 @@ class _Objects:
                 self.read += size
                 if named(file)[0] != digest:
                     return "damaged object", "its bytes do not match its name; no record names it"
-        return "orphan object", f"{size_text(size)} that no record names: see koop gc"
+        return (
+            "orphan object",
+            f"{size_text(size)} that no record names: koop gc removes it; after a copy that was cut off, copy again",
+        )
 
 
 def _pins(store: Store, stock: Stock) -> Iterator[Finding]:

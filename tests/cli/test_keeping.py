@@ -168,6 +168,40 @@ def test_a_repair_that_was_cut_off_goes_on(koop, made, monkeypatch):
     assert made["fit-edmd"][0].exists()
 
 
+@pytest.mark.parametrize("order", [("records", "objects"), ("objects", "records")])
+@pytest.mark.parametrize("whole", [1, 4])
+def test_a_store_whose_copying_was_cut_off(koop, folder, made, order, whole):
+    """What is whole is served, what is missing is named, and can be made again."""
+    source, copy = folder / "artefacts", folder / "copy"
+    to_copy = [file for part in order for file in sorted((source / part).rglob("*.*"))]
+    for number, file in enumerate(to_copy[: whole + 1]):
+        target = copy / file.relative_to(source)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(file.read_bytes() if number < whole else file.read_bytes()[: file.stat().st_size // 2])
+    complete = {
+        f"{stage}/{record.stem[:12]}"
+        for stage, (record, content) in made.items()
+        if {record, content} <= set(to_copy[:whole])
+    }
+    recorded = {f"{file.parent.name}/{file.stem[:12]}" for file in to_copy[: whole + 1] if file.suffix == ".json"}
+    for options in ([], ["--fast"]):
+        report = koop("verify", "--json", "--store", "copy", *options)
+        assert {one["name"] for one in findings(report) if one["damage"]} - {""} == recorded - complete
+        named = {one["path"] for one in findings(report)}
+        if not options or order[0] == "records":
+            assert str(to_copy[whole].relative_to(source)) in named
+            assert report.code == 5
+    for name in complete:
+        shown = koop("show", name, "--store", "copy")
+        assert shown.code == 0
+        assert "made in" not in shown.err
+    again = koop("fit-edmd", "--store", "copy")
+    assert again.name == f"fit-edmd/{made['fit-edmd'][0].stem[:12]}"
+    assert koop("verify", "--repair", "--store", "copy").code == 0
+    assert koop("verify", "--store", "copy").code == 0
+    assert read_all(copy) == 3
+
+
 def test_what_the_fast_check_sees(koop, made):
     flip(made["sample"][1])
     assert koop("verify", "--fast").code == 0
@@ -218,6 +252,23 @@ def test_a_record_that_unpacks_no_more(koop, made, monkeypatch):
     assert made["fit-edmd"][1].exists()  # its bytes are right: who has the right code can read it
     monkeypatch.delitem(STAGES, "fit-edmd")
     assert [one["kind"] for one in findings(koop("verify", "--json"))] == ["newer format"]
+
+
+def test_a_kind_that_this_koop_lacks_is_no_damage(koop, folder, made):
+    from koopcli.records import Packed
+    from koopcli.store import Store
+
+    store = Store(folder / "artefacts")
+    record = store.find("fit-edmd")
+    packed = store.read(record)
+    meta = {**packed.meta, "dynamics": {**packed.meta["dynamics"], "kind": "wavelets"}}
+    recipe = {**record.recipe, "settings": {"terms": {"kind": "wavelets"}}}
+    newer = store.commit(recipe, record.lineage, Packed(packed.arrays, meta), {"time": "", "seconds": 0.0})
+    for options in ([], ["--repair"]):
+        told = koop("verify", "--json", *options)
+        assert told.code == 0
+        assert [(one["kind"], one["name"]) for one in findings(told)] == [("newer format", newer.name)]
+    assert store.path(newer).exists()
 
 
 def test_what_is_no_damage_is_told_and_left_alone(koop, folder, made):

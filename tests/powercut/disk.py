@@ -231,8 +231,8 @@ def states(start: Disk, done: Sequence[Operation]) -> Iterator[State]:
     for i in loose:
         # Litter of long ago is there as a whole or not at all.
         if i >= len(done) - RECENT or (isinstance(made := done[i], Named) and made.is_folder):
-            yield state(f"all but {done[i]}", [j for j in every if j != i])
-            yield state(f"only {done[i]}", [i])
+            yield state(f"all but {done[i]!s:.99}", [j for j in every if j != i])
+            yield state(f"only {done[i]!s:.99}", [i])
     for name, content in CONTENTS.items():
         yield state(f"everything, its contents {name}", every, content)
     yield state("entries without contents", entries)

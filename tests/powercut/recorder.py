@@ -22,6 +22,7 @@ Event = tuple[Any, ...]
 ("extend", path, size), ("holds", path, bytes): what HDF5 has written, and ("say", text).
 """
 LOG, FOLDER = "POWERCUT_LOG", "POWERCUT_FOLDER"
+LARGE = "POWERCUT_LARGE"  # set: every artefact is taken for a large one
 
 
 class Log(Protocol):
@@ -166,15 +167,27 @@ class _Saying(io.TextIOBase):
         self._stream.flush()
 
 
+def record_commands(stack: ExitStack) -> None:
+    """Record this process until ``stack`` is left, as its environment says."""
+    log = EventFile(Path(os.environ[LOG]))
+    stack.enter_context(recording(Path(os.environ[FOLDER]), log))
+    if LARGE in os.environ:
+        from koopcli.store import image
+
+        stack.enter_context(patch.object(image, "IMAGE_LIMIT", 0))
+    for name in ("stdout", "stderr"):
+        stack.enter_context(patch.object(sys, name, _Saying(getattr(sys, name), log)))
+
+
 def main(argv: list[str]) -> int:
     from koopcli.__main__ import main as koop
 
-    log = EventFile(Path(os.environ[LOG]))
-    with recording(Path(os.environ[FOLDER]), log), patch.object(sys, "stdout", _Saying(sys.stdout, log)):
+    with ExitStack() as stack:
+        record_commands(stack)
         return koop(argv)
 
 
 if __name__ == "__main__":
     sys.exit(main(sys.argv[1:]))
-elif __name__ == "__mp_main__":  # a worker of such a command
-    ExitStack().enter_context(recording(Path(os.environ[FOLDER]), EventFile(Path(os.environ[LOG]))))
+elif __name__ == "__mp_main__":  # a worker of such a command, until it ends
+    record_commands(ExitStack())

@@ -5,9 +5,11 @@ import os
 from contextlib import contextmanager
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 
+import koopcli
 from koopcli.config.changes import parse_set
 from koopcli.config.experiment import load_experiment
 from koopcli.errors import DamagedArtefactError, NewerFormatError, UnknownNameError
@@ -359,6 +361,8 @@ def test_records_hold_where_they_came_from(fresh):
     assert record.lineage["trajectories"].startswith("simulate/")
     assert record.recipe["settings"] == {"order": 2}  # what is at its default is not in the key
     assert {"time", "host", "versions", "argv", "seconds", "peak_memory_mb", "git", "code"} <= set(record.provenance)
+    versions = {name: record.provenance["versions"][name] for name in ("koopcli", "numpy", "h5py")}
+    assert versions == {"koopcli": koopcli.__version__, "numpy": np.__version__, "h5py": h5py.__version__}
 
 
 def test_what_is_there_needs_no_digest_of_the_code(fresh, monkeypatch):

@@ -8,6 +8,7 @@ import threading
 import time
 
 import pytest
+from filelock import FileLock
 
 from koopcli.errors import DamagedArtefactError
 from koopcli.store import Store, collect
@@ -226,6 +227,38 @@ def test_pinned_between_plan_and_removal(store):
     planned = plan(store, 0, delete=True)
     (store.root / "refs" / "late.json").write_text("")
     assert remove(store, planned) == []
+
+
+def test_a_pin_that_was_damaged_between_plan_and_removal_keeps_all(store):
+    old = commit(store, 1, days=30)
+    planned = plan(store, WEEK, delete=True)
+    make_folder(store.root / "refs")
+    (store.root / "refs" / "late.json").write_text("")
+    assert remove(store, planned) == []
+    assert there(store) == {old.key}
+
+
+def test_a_record_that_was_replaced_between_plan_and_removal_stays(store):
+    """By one of a newer koop, say, whose object is the same."""
+    old = commit(store, 1, days=30)
+    planned = plan(store, WEEK, delete=True)
+    path = record_path(store, old)
+    path.write_text(json.dumps({**json.loads(path.read_text()), "schema": SCHEMA + 1}))
+    assert remove(store, planned) == []
+    assert path.exists()
+    assert store.path(old).exists()
+
+
+def test_chunks_that_somebody_went_on_with_between_plan_and_removal_stay(store):
+    for name in ("1" * 64, "2" * 64):
+        store.parts(name).commit(0, packed())
+        age(30, *(store.root / "partial" / name).iterdir())
+    planned = plan(store, WEEK, delete=True)
+    make_folder(store.root / "locks")
+    with FileLock(store.root / "locks" / f"{'1' * 64}.lock"):
+        assert [one.name for one in remove(store, planned)] == [f"partial/{'2' * 64}"]
+    assert store.parts("1" * 64).read({0}).keys() == {0}
+    assert not (store.root / "partial" / ("2" * 64)).exists()
 
 
 def test_made_again_between_plan_and_removal(store):

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import hashlib
 import math
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 
 from koopcli.errors import InvalidValueError
 from koopcli.records import Array, Packed
-from koopcli.store import image
+from koopcli.store import identity, image
 from koopcli.store.identity import canonical, data_digest, key_of
 
 TEXT = st.text('a.é\u2028\0😀"\\ ')  # spelled out: the table of all characters takes seconds to make
@@ -77,3 +78,14 @@ def test_the_digest_does_not_see_how_the_content_is_stored(tmp_path):
     for other in (fortran, big_endian, image.from_bytes(image.to_bytes(one)), image.from_path(tmp_path / "x.h5")):
         assert data_digest(other) == data_digest(one)
     assert image.to_bytes(fortran) == image.to_bytes(one) == image.to_bytes(big_endian)
+
+
+@pytest.mark.parametrize("shape", [(40,), (7, 5), (3, 4, 5), (2, 40), (0, 3)])
+def test_large_arrays_are_hashed_slab_by_slab(monkeypatch, shape):
+    """The digest is of all values in order, however many slabs they are read in."""
+    monkeypatch.setattr(identity, "SLAB", 100)
+    x = np.arange(math.prod(shape), dtype=float).reshape(shape)
+    axes = ("a", "b", "c")[: x.ndim]
+    head = canonical(["x", "<f8", list(shape), "m", list(axes)])
+    plain = hashlib.sha256(head + x.tobytes() + canonical({"dt": 0.1})).hexdigest()
+    assert data_digest(Packed({"x": Array(x, axes, "m")}, {"dt": 0.1})) == plain

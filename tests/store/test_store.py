@@ -17,7 +17,7 @@ from koopcli.errors import (
     UnknownNameError,
 )
 from koopcli.records import Array, Packed
-from koopcli.store import Store, digests, image
+from koopcli.store import Store, digests, identity, image
 from koopcli.store import parts as parts_module
 from koopcli.store.code import code_digest
 from koopcli.store.files import make_folder, publish, size_text, sweep
@@ -96,6 +96,29 @@ def test_large_content_goes_through_a_file(store, monkeypatch, large):
     store.path(record).write_bytes(content)
     with pytest.raises(DamagedArtefactError):
         store.read(record)
+
+
+@pytest.mark.parametrize("limit", [image.IMAGE_LIMIT, 100], ids=["in memory", "by a file"])
+@pytest.mark.parametrize("shape", [(400,), (70, 5), (3, 4, 50)])
+def test_every_value_comes_back_from_many_slabs(store, monkeypatch, limit, shape):
+    """Compared with the values themselves: bytes and digest come from the same slabs."""
+    monkeypatch.setattr(identity, "SLAB", 100)
+    monkeypatch.setattr(image, "IMAGE_LIMIT", limit)
+    values = np.random.default_rng(0).standard_normal(shape)
+    made = store.commit(recipe(), {}, Packed({"x": Array(values, ("a", "b", "c")[: values.ndim], "m")}, {}), {})
+    assert (Store(store.root).read(made).arrays["x"].values[...] == values).all()
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_a_write_that_takes_less_than_it_was_given_goes_on(store, monkeypatch, large):
+    real = os.pwrite
+    monkeypatch.setattr(os, "pwrite", lambda descriptor, content, place: real(descriptor, content[:7], place))
+    if large:
+        monkeypatch.setattr(image, "IMAGE_LIMIT", 100)
+    values = np.random.default_rng(0).standard_normal(200)
+    made = store.commit(recipe(), {}, Packed({"x": Array(values, ("row",), "m")}, {}), {})
+    assert Store(store.root).record("sample", made.key) == made
+    assert (store.read(made).arrays["x"].values[...] == values).all()
 
 
 def test_damage_is_never_lost_in_quarantine(store):
@@ -322,6 +345,17 @@ def test_litter_of_dead_processes_is_swept_by_the_file_systems_clock(tmp_path):
     assert {p.name for p in tmp_path.iterdir()} == {names["mine"], names["elsewhere"]}
     sweep(tmp_path, now + 100_000)
     assert not list(tmp_path.iterdir())
+
+
+def test_the_first_commit_of_a_store_sweeps_litter(store):
+    commit(store)
+    litter = store.root / "tmp" / "1-cc@another"
+    litter.write_text("")
+    os.utime(litter, (1, 1))
+    commit(store, 1)
+    assert litter.exists()  # once a process is enough
+    commit(Store(store.root), 2)
+    assert not litter.exists()
 
 
 def test_publish_never_leaves_half_a_file(tmp_path):

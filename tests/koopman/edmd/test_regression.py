@@ -65,3 +65,14 @@ def test_nothing_and_nan_are_refused(data):
         least_squares(lambda: iter(()))
     with pytest.raises(InvalidValueError, match="not finite"):
         least_squares(lambda: [(V * np.nan, Y)])
+
+
+@pytest.mark.parametrize("limit", [1e6, 0.5], ids=["gram", "qr"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_target_that_is_not_finite_is_refused(data, limit, bad, monkeypatch):
+    """As of a trajectory that blows up in its last sample, which no column holds."""
+    monkeypatch.setattr(regression, "GRAM_CONDITION", limit)
+    V, Y = data[0], data[1].copy()
+    Y[-1, 2] = bad
+    with pytest.raises(InvalidValueError, match="not finite"):
+        least_squares(blocks(V, Y, 50))

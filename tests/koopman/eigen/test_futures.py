@@ -11,6 +11,7 @@ from scipy.linalg import expm
 from koopcli.choices import names_of
 from koopcli.errors import InvalidValueError
 from koopcli.koopman import stored
+from koopcli.koopman.eigen import futures
 from koopcli.koopman.eigen.fit import with_images
 from koopcli.koopman.eigen.frames import FRAMES, check_frame, yaw
 from koopcli.koopman.eigen.lookup.lookup import Lift
@@ -92,15 +93,27 @@ def test_a_linear_system_is_predicted_as_well_as_exponentials_hold_it(linear, li
 def test_at_a_node_it_is_the_projected_future(rolling, frame):
     data, _ = rolling
     predictor = eigen_fit(data, **AHEAD, lift="linear", frame=frame, tabulated=50)
-    futures = predictor.observables
+    lifted = predictor.observables
     x = np.asarray(data.x)[5:25, 17]
     ahead = np.asarray(data.x)[5:25, 17:48]
-    assert futures.future(x) == pytest.approx(ahead, abs=1e-8)
+    assert lifted.future(x) == pytest.approx(ahead, abs=1e-8)
     found = predictor.predict(x, steps=30)
     assert rmse(found, ahead).max() < 1.0
     z = predictor.lift(x)
     assert z.shape == (20, 42)
-    assert z.reshape(20, 3, 14) == pytest.approx(np.matmul(futures.projection, ahead).transpose(0, 2, 1), abs=1e-6)
+    assert z.reshape(20, 3, 14) == pytest.approx(np.matmul(lifted.projection, ahead).transpose(0, 2, 1), abs=1e-6)
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_what_is_too_large_for_a_table_is_gathered_alike(rolling, frame, monkeypatch):
+    data, test = rolling
+    lifted = eigen_fit(data, **AHEAD, lift="linear", frame=frame, tabulated=50, nodes=6).observables
+    x0 = np.asarray(test.x)[:, 0]
+    from_table = lifted.future(x0)
+    monkeypatch.setattr(futures, "LARGEST_TABLE", 1.0)
+    monkeypatch.setattr(futures, "GATHERED", 7)
+    assert lifted.future(x0) == pytest.approx(from_table, rel=1e-12, abs=1e-12)
+    assert np.isfinite(from_table).all()
 
 
 def test_the_first_sample_is_the_state_itself(rolling):

@@ -10,7 +10,7 @@ from koopcli.koopman.eigen.lookup.cloud import Cloud
 from koopcli.koopman.eigen.lookup.lookup import Lift, search
 from koopcli.koopman.eigen.lookup.nearest import NearestLift
 from koopcli.koopman.eigen.lookup.polyharmonic import LARGEST, spline_weights
-from koopcli.koopman.eigen.nodes import Search, nodes_of, thinned
+from koopcli.koopman.eigen.nodes import Search, _first_in_each, nodes_of, thinned
 
 LIFTS = Lift.kinds()
 
@@ -212,3 +212,27 @@ def test_a_radial_power_spreads_out_the_middle():
     x = np.array([[4.0, 0, 0], [0, -1.0, 0], [0, 0, 0]])
     found = Search(NearestLift(), np.array([4.0, 4, 4]), power=0.5).place(x)
     assert found == pytest.approx(np.array([[1, 0, 0], [0, -0.5, 0], [0, 0, 0]]))
+
+
+def test_far_apart_places_are_told_apart():
+    """Voxels whose numbers no 64 bits hold: 2³² of them along each axis."""
+    far = 2**32 - 1
+    voxels = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 0, 0], [far, far, far]])
+    assert np.sort(_first_in_each(voxels)).tolist() == [0, 1, 2, 4]
+
+
+def test_a_spline_is_made_no_simpler_than_it_has_to_be():
+    """Nodes close to a plane leave a quadratic open at some places, and a linear tail at some of these, and so on."""
+    rng = np.random.default_rng(8)
+    nodes = np.column_stack([rng.uniform(-1, 1, (60, 2)), 0.03 * rng.standard_normal(60)])
+    y = rng.uniform(-0.3, 0.3, (200, 3))
+    indices, weights = made("polyharmonic", nodes)(y)
+    near = nodes[indices] - y[:, np.newaxis]
+    near /= np.sqrt((near**2).sum(axis=2)).max(axis=1)[:, np.newaxis, np.newaxis]
+    left = np.arange(200)
+    for degree, softness in ((2, 1e-9), (1, 1e-9), (1, 1e-4), (1, 1e-2)):
+        simpler = spline_weights(near[left], degree, softness)
+        tame = np.abs(simpler).sum(axis=1) <= 10
+        assert tame.sum() > 0
+        assert weights[left[tame]] == pytest.approx(simpler[tame], abs=1e-5)
+        left = left[~tame]
