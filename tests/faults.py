@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import os
 import random
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -21,9 +22,11 @@ from pathlib import Path
 import numpy as np
 
 from koopcli.errors import DamagedArtefactError, StorageError
-from koopcli.store import Record, Store, image
+from koopcli.store import Record, Store
+from koopcli.store.image import loaded
+from tests.large import large_from
 from tests.powercut import commands
-from tests.writer import KEYS, commit, content
+from tests.writer import KEYS, LARGE, SLAB, commit, content
 
 UNFINISHED = "f" * 64
 CALLS = ("open", "pwrite", "fsync", "replace", "mkdir", "posix_fallocate")
@@ -43,7 +46,7 @@ class Count:
 
 def good(store: Store, record: Record) -> bool:
     """Whether what is read is what was committed."""
-    packed = store.read(record)
+    packed = loaded(store.read(record))
     expected = content(packed.meta["seed"])
     right = record.recipe["settings"]["seed"] == packed.meta["seed"]
     return right and bool((np.asarray(packed.arrays["x"].values) == expected.arrays["x"].values).all())
@@ -66,6 +69,7 @@ def settle(store: Store, committed: set[str], count: Count) -> None:
             count.lost += key in committed
 
 
+@large_from(LARGE, SLAB)
 def kills(folder: Path, times: int, writers: int, seed: int = 0) -> Count:
     """kill -9 of ``writers`` processes that commit to the same keys of one store, at random moments."""
     rng, count, committed = random.Random(seed), Count(), set()
@@ -85,7 +89,7 @@ def kills(folder: Path, times: int, writers: int, seed: int = 0) -> Count:
             committed |= {names[int(text)] for text in f"{line}{rest}".splitlines() if text}
         settle(Store(folder / "store"), committed, count)
         if count.injected % 5 == 0:  # so that first commits are struck too, not only those of what is there
-            subprocess.run(["rm", "-rf", str(folder / "store")], check=True)
+            shutil.rmtree(folder / "store")
             committed = set()
     return count
 
@@ -109,30 +113,27 @@ def failing(call: str, n: int, code: int) -> Iterator[Callable[[], int]]:
         setattr(os, call, real)
 
 
+@large_from(LARGE, SLAB)
 def errors(folder: Path, code: int) -> Count:
     """An error at the n-th call of each kind, for every n of a commit: the old state is left, or the new.
 
     For what is laid out in memory, for what is large, and for a chunk.
     """
-    count, usual = Count(), image.IMAGE_LIMIT
-    for what, limit, put in (("small", usual, commit), ("large", 0, commit), ("chunk", usual, chunk)):
+    count = Count()
+    for what, put, seed in (("small", commit, 2), ("large", commit, 1), ("chunk", chunk, 1)):
         for call in CALLS:
             reached, n = True, 0
             while reached:
                 n += 1
                 root, done = folder / f"{what}-{call}-{n}", False
                 old = commit(Store(root), 0).key
-                image.IMAGE_LIMIT = limit
-                try:
-                    with failing(call, n, code) as calls:
-                        try:
-                            put(Store(root), 1)
-                            done = True
-                        except StorageError:
-                            count.struck += 1
-                        reached = calls() >= n
-                finally:
-                    image.IMAGE_LIMIT = usual
+                with failing(call, n, code) as calls:
+                    try:
+                        put(Store(root), seed)
+                        done = True
+                    except StorageError:
+                        count.struck += 1
+                    reached = calls() >= n
                 count.injected += reached
                 settle(Store(root), {old}, count)
                 found = len(Store(root).index()) > 1 or 1 in Store(root).parts(UNFINISHED).read({1})
@@ -146,11 +147,12 @@ def chunk(store: Store, seed: int) -> None:
     store.parts(UNFINISHED).commit(seed, content(seed))
 
 
-def damage(folder: Path, flips: int, cuts: int, seed: int = 0) -> tuple[Count, Count]:
-    """Single bits flipped, and ends cut off, over the whole of an object: each is found when it is read."""
+@large_from(LARGE, SLAB)
+def damage(folder: Path, flips: int, cuts: int, which: int, seed: int = 0) -> tuple[Count, Count]:
+    """Single bits flipped, and ends cut off, over the whole of the object ``which``: each is found when it is read."""
     rng, flipped, cut = random.Random(seed), Count(), Count()
-    store = Store(folder / "store")
-    record = commit(store, 3)
+    store = Store(folder / f"store-{which}")
+    record = commit(store, which)
     path, whole = store.path(record), store.path(record).read_bytes()
     for count, times in ((flipped, flips), (cut, cuts)):
         for _ in range(times):
@@ -162,11 +164,11 @@ def damage(folder: Path, flips: int, cuts: int, seed: int = 0) -> tuple[Count, C
             path.write_bytes(bad)
             count.injected += 1
             try:
-                store.read(record)
+                loaded(store.read(record))
                 count.accepted += 1
             except DamagedArtefactError:
                 count.struck += 1
-            subprocess.run(["rm", "-rf", str(store.root / "quarantine")], check=True)
+            shutil.rmtree(store.root / "quarantine", ignore_errors=True)
     path.write_bytes(whole)
     assert good(store, record)
     return flipped, cut
@@ -191,8 +193,9 @@ def main() -> None:
             (errno.EACCES, "permission denied"),
         ):
             row(f"{what} at the n-th open, write, fsync, rename, …", errors(work / str(code), code))
-        for what, count in zip(("a bit flipped", "an end cut off"), damage(work, 3000, 2000), strict=True):
-            row(f"{what} in an object", count)
+        for which, kind in ((0, "an object"), (1, "a large object")):
+            for what, count in zip(("a bit flipped", "an end cut off"), damage(work, 3000, 2000, which), strict=True):
+                row(f"{what} in {kind}", count)
     commands.main([])
 
 

@@ -28,8 +28,9 @@ def test_an_error_at_any_call_of_a_commit_leaves_the_old_state_or_the_new(tmp_pa
     assert (count.lost, count.accepted) == (0, 0)
 
 
-def test_every_flipped_bit_and_every_cut_is_found(tmp_path):
-    flipped, cut = damage(tmp_path, 300, 200)
+@pytest.mark.parametrize("which", [0, 1], ids=["small", "large"])
+def test_every_flipped_bit_and_every_cut_is_found(tmp_path, which):
+    flipped, cut = damage(tmp_path, 300, 200, which)
     assert (flipped.injected, flipped.struck, flipped.accepted) == (300, 300, 0)
     assert (cut.injected, cut.struck, cut.accepted) == (200, 200, 0)
 

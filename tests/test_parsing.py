@@ -130,4 +130,4 @@ def test_records_and_what_is_read_beside_them(tmp_path, levels, good):
     lost = tmp_path / "sample" / f"{key_of(recipe)}.json"
     lost.parent.mkdir()
     lost.write_text(json.dumps({"recipe": recipe})[:-1] + f', "more": {lists(levels - 1)}}}')
-    assert (repair._recipe(lost) is not None) == good
+    assert (repair._recipe(lost, f"sample/{key_of(recipe)}") is not None) == good

@@ -12,15 +12,19 @@ from typing import Any
 import numpy as np
 
 from koopcli.records import Array, Packed
-from koopcli.store import Record, Store, image
+from koopcli.store import Record, Store
 from koopcli.store.identity import SCHEMA
+from tests.large import large_from
 
 KEYS = 40
+ROWS = 4000  # 32 kB
+LARGE, SLAB = 48_000, 1 << 14  # bytes of an object over which it is taken for large, and of its slabs
 
 
 def content(seed: int) -> Packed:
-    """Its values say whose they are."""
-    return Packed({"x": Array(seed + np.arange(4000.0), ("row",), "m")}, {"seed": seed})
+    """Its values say whose they are. Those of odd seeds are large."""
+    rows = 2 * ROWS if seed % 2 else ROWS
+    return Packed({"x": Array(seed + np.arange(float(rows)), ("row",), "m")}, {"seed": seed})
 
 
 def recipe(seed: int) -> dict[str, Any]:
@@ -33,11 +37,10 @@ def commit(store: Store, seed: int) -> Record:
 
 def main(root: str, first: int, count: int) -> None:
     store = Store(Path(root))
-    usual = image.IMAGE_LIMIT
-    for seed in range(first, first + count):
-        image.IMAGE_LIMIT = 0 if seed % 2 else usual  # every other one as if it were large
-        commit(store, seed % KEYS)
-        print(seed % KEYS, flush=True)
+    with large_from(LARGE, SLAB):
+        for seed in range(first, first + count):
+            commit(store, seed % KEYS)
+            print(seed % KEYS, flush=True)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, fields
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -12,7 +11,7 @@ import typer
 from koopcli.cli.completion import complete_vehicle
 from koopcli.cli.invocation import print_json
 from koopcli.cli.options import JsonOption
-from koopcli.config.data import data_folder, locate
+from koopcli.config.data import locate
 from koopcli.config.settings import Simulate
 from koopcli.console import Console, show_line, show_table
 from koopcli.errors import InvalidValueError
@@ -38,10 +37,10 @@ def ls(as_json: JsonOption = False) -> None:
 
     Example: koop vehicle ls
     """
+    from koopcli.config.shipped import vehicles
     from koopcli.simulation.portrait import plants_of
-    from koopcli.vehicles.parameters import read_vehicle_file
 
-    files = {path.stem: read_vehicle_file(path) for path in _shipped()}
+    files = vehicles()
     if as_json:
         print_json({name: {"title": file.title, "plants": plants_of(file.parameters)} for name, file in files.items()})
         return
@@ -126,10 +125,6 @@ def _parameters(table: Any, prefix: str = "") -> list[list[str]]:
         else:
             rows += _parameters(value, f"{f.name}.")
     return rows
-
-
-def _shipped() -> list[Path]:
-    return sorted((data_folder() / "vehicles").glob("*.toml"))
 
 
 def register(app: typer.Typer) -> None:

@@ -25,13 +25,14 @@ from koopcli.config.data import locate
 from koopcli.config.declared import DECLARED, KINDS
 from koopcli.config.pictures import PlotOptions
 from koopcli.config.settings import About, Baseline, Evaluate, Reproduce, Simulate
+from koopcli.config.shipped import vehicle_named
 from koopcli.errors import InvalidValueError, KoopError
 from koopcli.koopman.edmd.fit import FitEdmd
 from koopcli.koopman.eigen.fit import FitEigen
 from koopcli.parsing import parse_toml
 from koopcli.simulation.samples.sample import SampleChoice
 from koopcli.text import read_text
-from koopcli.vehicles.parameters import VehicleParameters, change, read_vehicle
+from koopcli.vehicles.parameters import VehicleParameters, change
 from koopcli.vehicles.plants.plant import PlantChoice
 
 DEFAULT_VEHICLE = "ctu-2020"
@@ -219,11 +220,6 @@ def _experiment(sources: tuple[Sections, ...]) -> Experiment:
         plot=settings(PlotOptions, "plot"),
         reproduce=settings(Reproduce, "reproduce"),
     )
-
-
-def vehicle_named(name: str, folder: Path = Path()) -> VehicleParameters:
-    """The vehicle ``name`` (shipped, or a file by its path from ``folder``)."""
-    return read_vehicle(locate("vehicles", name, "vehicle", folder))
 
 
 def _read(path: Path, here: Origin) -> Changes:

@@ -7,12 +7,12 @@ from typing import Any
 
 from koopcli.choices import told, written
 from koopcli.config.changes import flat
-from koopcli.config.data import data_folder
 from koopcli.config.experiment import DEFAULT_VEHICLE
 from koopcli.config.grids import text_of
 from koopcli.config.settings import Simulate
+from koopcli.config.shipped import vehicles
 from koopcli.simulation.samples.sample import SampleChoice
-from koopcli.vehicles.parameters import VehicleParameters, read_vehicle
+from koopcli.vehicles.parameters import VehicleParameters
 from koopcli.vehicles.plants.plant import PlantChoice
 
 Words = dict[str, str]
@@ -22,9 +22,8 @@ def vehicle_words(vehicle: VehicleParameters, plant: PlantChoice) -> Words | Non
     """The shipped vehicle that differs least in what the ``plant`` uses of ``vehicle``, with the differences; None
     where each has something that this one has not.
     """
-    shipped = {path.stem: read_vehicle(path) for path in (data_folder() / "vehicles").glob("*.toml")}
     mine = _flat(vehicle, plant)
-    changes = {name: _differing(mine, _flat(theirs, plant)) for name, theirs in shipped.items()}
+    changes = {name: _differing(mine, _flat(theirs.parameters, plant)) for name, theirs in vehicles().items()}
     sayable = [name for name, changed in changes.items() if None not in changed.values()]
     if not sayable:
         return None

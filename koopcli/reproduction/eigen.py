@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from koopcli.choices import written
-from koopcli.config.experiment import DEFAULT_VEHICLE, Experiment, vehicle_named
+from koopcli.config.experiment import DEFAULT_VEHICLE, Experiment
 from koopcli.config.paper import EIGEN_RMSE
 from koopcli.config.settings import Simulate
+from koopcli.config.shipped import vehicle_named
 from koopcli.koopman.eigen.fit import FitEigen
 from koopcli.records import Meta
 from koopcli.reproduction import eigen_cells as blocks

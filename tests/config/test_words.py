@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from koopcli.config.changes import parse_set
-from koopcli.config.experiment import load_experiment, vehicle_named
+from koopcli.config.experiment import load_experiment
 from koopcli.config.settings import Simulate
+from koopcli.config.shipped import vehicle_named
 from koopcli.config.words import plant_words, sample_words, vehicle_words
 from koopcli.simulation.samples.ellipsoid import EllipsoidSample
 from koopcli.simulation.samples.grid import GridSample

@@ -172,9 +172,9 @@ def record_commands(stack: ExitStack) -> None:
     log = EventFile(Path(os.environ[LOG]))
     stack.enter_context(recording(Path(os.environ[FOLDER]), log))
     if LARGE in os.environ:
-        from koopcli.store import image
+        from tests.large import large_from
 
-        stack.enter_context(patch.object(image, "IMAGE_LIMIT", 0))
+        stack.enter_context(large_from(0))
     for name in ("stdout", "stderr"):
         stack.enter_context(patch.object(sys, name, _Saying(getattr(sys, name), log)))
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from koopcli.config.experiment import vehicle_named
+from koopcli.config.shipped import vehicle_named
 from koopcli.records import Packed, Trajectories
 from koopcli.simulation import integrate as integration
 from koopcli.simulation.integrate import LARGEST, LOST, STIFF, integrate, simulate

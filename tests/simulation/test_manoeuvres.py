@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from koopcli.config.experiment import vehicle_named
+from koopcli.config.shipped import vehicle_named
 from koopcli.simulation import sampling
 from koopcli.simulation.integrate import simulate
 from koopcli.simulation.manoeuvres import MANOEUVRES, Driver

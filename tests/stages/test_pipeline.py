@@ -20,9 +20,10 @@ from koopcli.stages import read, recipes
 from koopcli.stages.chunks import Chunk, commit
 from koopcli.stages.pipeline import Pipeline
 from koopcli.stages.registry import STAGES
-from koopcli.store import Store, digests, image
+from koopcli.store import Store
 from koopcli.store.code import code_digest
 from koopcli.vehicles.plants.forces import Forces
+from tests.large import large_from
 from tests.powercut.recorder import Events, recording
 
 SMALL = ["sample.count=5", "sample.columns=2", "fit-edmd.order=2", "test.count=40", "test.steps=5", "evaluate.chunk=10"]
@@ -138,11 +139,9 @@ def damage(store, record):
 
 
 @pytest.fixture
-def on_disk(monkeypatch):
-    """Every object is large, and read where a stage reads it."""
-    monkeypatch.setattr(digests, "SLAB", 1 << 10)
-    for module, limit in ((digests, "WHOLE"), (image, "IMAGE_LIMIT"), (image, "MEMORY_LIMIT")):
-        monkeypatch.setattr(module, limit, 0)
+def on_disk():
+    with large_from(0):
+        yield
 
 
 def test_damage_that_a_stage_meets_while_it_reads_is_made_again(fresh, store, on_disk):

@@ -16,6 +16,7 @@ from koopcli.store.collect import plan, remove
 from koopcli.store.files import DAY
 from koopcli.store.identity import SCHEMA
 from koopcli.store.verify import verify
+from tests.large import large_from
 
 SLAB = 1 << 10
 ROWS = 4000  # of each array, 8 bytes each
@@ -23,11 +24,9 @@ RECIPE = {"schema": SCHEMA, "stage": "sample", "version": 1, "settings": {}, "in
 
 
 @pytest.fixture(autouse=True)
-def large(monkeypatch):
-    """Every object is large, and its arrays stay on disk."""
-    monkeypatch.setattr(digests, "SLAB", SLAB)
-    for module, limit in ((digests, "WHOLE"), (image, "IMAGE_LIMIT"), (image, "MEMORY_LIMIT")):
-        monkeypatch.setattr(module, limit, 1000)
+def large():
+    with large_from(1000, SLAB):
+        yield
 
 
 def packed() -> Packed:

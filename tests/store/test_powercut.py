@@ -15,29 +15,26 @@ from tempfile import TemporaryDirectory
 import pytest
 
 from koopcli.errors import KoopError
-from koopcli.store import Store, image
+from koopcli.store import Store
 from koopcli.store.identity import key_of
 from koopcli.store.pins import pin, pins
 from tests.faults import UNFINISHED, good
+from tests.large import large_from
 from tests.powercut.disk import Disk, Operation, Said, Synced, disk_of, lay_out, operations, states
 from tests.powercut.recorder import Event, Events, recording
-from tests.writer import commit, content, recipe
+from tests.writer import LARGE, SLAB, commit, content, recipe
 
-SEEDS = (0, 1)  # the second is committed as if it were large
+SEEDS = (0, 1)  # the second is large
 KEPT = "kept"
 MEMORY = Path("/dev/shm")
 
 
 def work(root: Path, say: Callable[[str], None]) -> None:
     """Lock, commit and pin as commands do; what is committed is said."""
-    usual, store = image.IMAGE_LIMIT, Store(root)
+    store = Store(root)
     for seed in SEEDS:
-        try:
-            image.IMAGE_LIMIT = 0 if seed == 1 else usual
-            with store.lock(f"{seed:064}", "sample"):
-                record = commit(store, seed)
-        finally:
-            image.IMAGE_LIMIT = usual
+        with store.lock(f"{seed:064}", "sample"):
+            record = commit(store, seed)
         say(str(seed))
     pin(store, KEPT, [record])
     say(KEPT)
@@ -67,6 +64,12 @@ def lost(root: Path, promised: Collection[str], keys: dict[int, str]) -> list[st
             whole = False
         missing += [] if whole or str(seed) not in promised else [str(seed)]
     return missing + ([KEPT] if KEPT in promised and KEPT not in pins(store) else [])
+
+
+@pytest.fixture(autouse=True)
+def large():
+    with large_from(LARGE, SLAB):
+        yield
 
 
 @pytest.fixture

@@ -17,13 +17,14 @@ from koopcli.errors import (
     UnknownNameError,
 )
 from koopcli.records import Array, Packed
-from koopcli.store import Store, digests, identity, image
+from koopcli.store import Store, identity, image
 from koopcli.store import parts as parts_module
 from koopcli.store.code import code_digest
 from koopcli.store.files import make_folder, publish, size_text, sweep
 from koopcli.store.identity import SCHEMA
 from koopcli.store.names import store_root
 from koopcli.store.pins import pin, pins, unpin
+from tests.large import large_from
 
 
 def packed(value=1.0, n=4) -> Packed:
@@ -83,19 +84,17 @@ def test_a_flipped_bit_is_found_and_the_object_put_aside(store, where):
 
 
 @pytest.mark.parametrize("large", [False, True])
-def test_large_content_goes_through_a_file(store, monkeypatch, large):
-    if large:
-        monkeypatch.setattr(image, "IMAGE_LIMIT", 100)
-        monkeypatch.setattr(digests, "WHOLE", 100)
-    record = store.commit(recipe(), {}, packed(n=10_000), {})
-    assert store.path(record).stem == record.object
-    assert (store.read(record).arrays["x"].values[...] == 1).all()
-    assert not list((store.root / "tmp").iterdir())
-    content = bytearray(store.path(record).read_bytes())
-    content[-1] ^= 1
-    store.path(record).write_bytes(content)
-    with pytest.raises(DamagedArtefactError):
-        store.read(record)
+def test_large_content_goes_through_a_file(store, large):
+    with large_from(100 if large else 1 << 30):
+        record = store.commit(recipe(), {}, packed(n=10_000), {})
+        assert store.path(record).stem == record.object
+        assert (store.read(record).arrays["x"].values[...] == 1).all()
+        assert not list((store.root / "tmp").iterdir())
+        content = bytearray(store.path(record).read_bytes())
+        content[-1] ^= 1
+        store.path(record).write_bytes(content)
+        with pytest.raises(DamagedArtefactError):
+            image.loaded(store.read(record))
 
 
 @pytest.mark.parametrize("limit", [image.IMAGE_LIMIT, 100], ids=["in memory", "by a file"])
@@ -410,18 +409,17 @@ def test_what_others_have_put_right_is_not_put_aside(store, monkeypatch, what):
 
 
 def test_a_large_object_is_read_though_it_is_replaced_or_removed_meanwhile(store, monkeypatch):
-    for module, limit in ((image, "IMAGE_LIMIT"), (image, "MEMORY_LIMIT"), (digests, "WHOLE")):
-        monkeypatch.setattr(module, limit, 100)
-    record = store.commit(recipe(), {}, packed(n=10_000), {})
     real = image.from_open
 
     def overtaken(opened):
         store.path(record).unlink()
         return real(opened)
 
-    monkeypatch.setattr(image, "from_open", overtaken)
-    found = store.read(record)
-    assert (found.arrays["x"].values[...] == 1).all()
+    with large_from(100):
+        record = store.commit(recipe(), {}, packed(n=10_000), {})
+        monkeypatch.setattr(image, "from_open", overtaken)
+        found = store.read(record)
+        assert (found.arrays["x"].values[...] == 1).all()
 
 
 @pytest.mark.parametrize("text", ["nan", "inf", "-1", "soon"])

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from koopcli.config.experiment import vehicle_named
+from koopcli.config.shipped import vehicle_named
 from koopcli.vehicles import tyre
 from koopcli.vehicles.plants.wheels import TorqueInput
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from koopcli.checks import COMMAND_LINE
-from koopcli.config.experiment import vehicle_named
+from koopcli.config.shipped import vehicle_named
 from koopcli.errors import InvalidValueError
 from koopcli.simulation.portrait import derived, plants_of, remarks
 from koopcli.vehicles import handling

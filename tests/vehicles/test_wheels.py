@@ -8,7 +8,7 @@ from math import atan, atan2, cos, hypot, sin, sqrt, tanh
 import numpy as np
 import pytest
 
-from koopcli.config.experiment import vehicle_named
+from koopcli.config.shipped import vehicle_named
 from koopcli.errors import InvalidValueError
 from koopcli.simulation.integrate import LARGEST, integrate, simulate
 from koopcli.vehicles.handling import steady_steer, wheel_poles

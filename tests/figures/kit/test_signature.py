@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 
-from koopcli.config.experiment import vehicle_named
 from koopcli.config.pictures import Subject
-from koopcli.config.shipped import called, fingerprint
+from koopcli.config.shipped import called, fingerprint, vehicle_named
 from koopcli.figures.kit import style
 from koopcli.figures.kit.signature import LONGEST, signature
 from koopcli.vehicles.plants import PLANTS
