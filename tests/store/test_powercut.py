@@ -16,6 +16,7 @@ import pytest
 
 from koopcli.errors import KoopError
 from koopcli.store import Store
+from koopcli.store.digests import slabs_path
 from koopcli.store.identity import key_of
 from koopcli.store.pins import pin, pins
 from tests.faults import UNFINISHED, good
@@ -161,19 +162,21 @@ def test_what_a_killed_process_left_lasts_once_another_names_it(top, keys, unsyn
                 assert lost(top / "store", said(done[:cut]), keys) == [], f"{worst.what}: {events[killed - 1]}"
 
 
-def test_only_a_young_artefact_is_synced_before_it_is_named(top, unsynced):
+@pytest.mark.parametrize("seed", SEEDS, ids=["small", "large"])
+def test_only_a_young_artefact_is_synced_before_it_is_named(top, unsynced, seed):
     """The object, its folder, the record, its folder; one from the future is taken for young."""
     top.mkdir()
     store = Store(top / "store")
-    made = commit(store, 0)
+    made = commit(store, seed)
     path, record = store.path(made), store.root / "records" / "sample" / f"{made.key}.json"
+    slabs = [slabs_path(path), path.parent] if seed else []
     now = record.stat().st_mtime
     for age, synced in ((0, True), (-3600, True), (3600, False)):
         os.utime(record, (now - age,) * 2)
         events = Events()
         with recording(top, events):
             Store(store.root).sync(made)
-        expected = [path, path.parent, record, record.parent] if synced else []
+        expected = [*slabs, path, path.parent, record, record.parent] if synced else []
         assert events == [("sync", str(place)) for place in expected]
 
 
