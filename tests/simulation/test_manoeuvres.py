@@ -70,6 +70,7 @@ def test_the_double_lane_change_comes_to_the_next_lane_and_back():
     assert place[place[:, 0] < 15, 1] == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_sine_with_dwell_is_the_standards():
     x, u, _ = drive("sine-with-dwell")
     (_, mirrored), _ = both_ways("sine-with-dwell")

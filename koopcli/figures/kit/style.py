@@ -176,7 +176,9 @@ def render(figure: Figure, image: str, line: str) -> bytes:
 def _fix(figure: Figure) -> None:
     """Lay the figure out for print, for good: what is saved of it is then more than itself."""
     figure.set_dpi(DOTS)
-    figure.draw_without_rendering()
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
     figure.set_layout_engine("none")
     for legend in figure.legends:
         legend.set_bbox_to_anchor((0, 0, 1, 1), transform=figure.transFigure)
