@@ -190,4 +190,5 @@ def main(argv: list[str]) -> int:
 if __name__ == "__main__":
     sys.exit(main(sys.argv[1:]))
 elif __name__ == "__mp_main__":  # a worker of such a command, until it ends
-    record_commands(ExitStack())
+    until_the_end = ExitStack()  # left by nobody
+    record_commands(until_the_end)
