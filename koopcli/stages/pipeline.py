@@ -17,7 +17,7 @@ from koopcli.stages.vehicle import doubts
 from koopcli.stages.workers import Workers
 from koopcli.store import Record, Store
 from koopcli.store.code import code_digest
-from koopcli.store.identity import key_of
+from koopcli.store.identity import key_of, plain
 from koopcli.store.names import SHORT
 from koopcli.store.provenance import provenance
 
@@ -249,8 +249,8 @@ class Pipeline:
             )
             chunks = ChunkedWork(self.store, whole, self.workers, progress, self.reporter.note, cost(task).bytes)
             packed = stage.run(task.settings, contents, Context(progress, self.reporter.warn, chunks)).pack()
-        told = labels(task, packed)
-        return self.store.commit(recipe, lineage, packed, provenance(time.perf_counter() - start), told)
+        told, origin = labels(task, packed), provenance(time.perf_counter() - start)
+        return self.store.commit(recipe, lineage, packed, origin, told, plain(task.settings))
 
     def _rebuildable(self, task: Task, record: Record | None) -> None:
         """Refuse to replace a named artefact by something that today's code would not give the same key."""

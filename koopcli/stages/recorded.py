@@ -30,9 +30,12 @@ def content_of(record: Record, store: Store) -> Any:
 
 
 def settings_of(record: Record) -> Any:
-    """The settings in ``record``. Raises ``NewerFormatError`` when this version does not know them."""
+    """The settings that ``record`` was made with, whatever the defaults are by now.
+
+    Raises ``NewerFormatError`` when this version does not know them.
+    """
     try:
-        return stage_of(record).settings(record.recipe["settings"])
+        return stage_of(record).settings(record.settings or record.recipe["settings"])
     except (UsageError, InvalidValueError, KeyError, TypeError) as error:
         raise NewerFormatError(f"{record.name} {_other_version(record)} ({error})") from error
 

@@ -172,7 +172,7 @@ def _laid_out(file: h5py.File, packed: Packed, labels: Labels) -> Iterator[tuple
     """Every array's dataset, with its attributes and without its values; the facts are one too."""
     assert META not in packed.arrays, "the name is taken"
     facts = json.dumps(plain(packed.meta), sort_keys=True).encode()
-    arrays = {**packed.arrays, META: Array(np.frombuffer(facts, np.uint8), ("byte",), "1")}
+    arrays = {**packed.arrays, META: Array(np.frombuffer(facts, np.uint8), ("byte_of_meta",), "1")}
     for name, label in labels.items():
         _beside(file, name, label)
     layout = _timeless(h5p.DATASET_CREATE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from koopcli.errors import InvalidValueError, NewerFormatError
@@ -24,7 +24,7 @@ class Record:
 
     ``recipe`` {schema, stage, version, settings, inputs: {role: data digest}} hashes to ``key``; ``lineage`` names
     the inputs as "stage/key"; ``object`` is the sha256 of the stored bytes, ``size`` their number, ``data`` the
-    digest of the logical content.
+    digest of the logical content. ``settings``: every setting, since a default that the recipe leaves out may change.
     """
 
     recipe: Mapping[str, Any]
@@ -33,6 +33,7 @@ class Record:
     size: int
     data: str
     provenance: Mapping[str, Any]
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def key(self) -> str:
@@ -99,7 +100,7 @@ def whole_recipe(text: bytes, key: str) -> dict[str, Any] | None:
 def _well_formed(record: Record) -> bool:
     """Whether each entry has its form: paths are made of them."""
     return (
-        all(isinstance(value, dict) for value in (record.lineage, record.provenance))
+        all(isinstance(value, dict) for value in (record.lineage, record.provenance, record.settings))
         and all(isinstance(digest, str) and DIGEST.fullmatch(digest) for digest in (record.object, record.data))
         and type(record.size) is int
         and record.size >= 0

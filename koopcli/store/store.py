@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from itertools import count
 from pathlib import Path
+from types import MappingProxyType
 from typing import IO, Any, NoReturn
 
 from koopcli.errors import (
@@ -44,6 +45,7 @@ from koopcli.store.parts import Parts
 from koopcli.store.records import BadRecordError, Record
 
 CANDIDATES = 8
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 AGAIN = 3  # times to read a file that others replace meanwhile, before it is taken for damaged
 
 
@@ -145,14 +147,16 @@ class Store:
         packed: Packed,
         provenance: Mapping[str, Any],
         labels: image.Labels = image.NO_LABELS,
+        settings: Mapping[str, Any] = NOTHING,
     ) -> Record:
         """Store ``packed`` under ``recipe``, with ``labels`` for other tools: the object first, the record last.
+        ``settings``: all of them, at their defaults or not.
 
         Where locks do not hold, another process may have committed the same recipe meanwhile: the first record wins.
         """
         digest = data_digest(packed)
         path, size, _ = self._put(packed, self._target, labels)
-        record = Record(recipe, lineage, path.stem, size, digest, provenance)
+        record = Record(recipe, lineage, path.stem, size, digest, provenance, dict(settings))
         first = self.record(record.stage, record.key)
         if first is not None and self.has_object(first):
             self.sync(first)

@@ -32,6 +32,22 @@ SMALL = (
     "test.ball.count=20",
     "test.ball.steps=5",
 )
+AHEAD = (
+    "fit-eigen.window=horizon",
+    "fit-eigen.eigenvalues=comb",
+    "fit-eigen.pairs=3",
+    "fit-eigen.horizon=0.1",
+    "fit-eigen.trust=true",
+    "fit-eigen.lift=polyharmonic",
+    "fit-eigen.neighbours=20",
+    "fit-eigen.mirror=left-right",
+)
+OTHERS = {
+    "greedy": ("sample.budget=0.6", "sample.steps=3", "sample.usable=0.02", "sample.candidates=50"),
+    "drive": ("sample.count=3", "sample.steps=4", "vehicle.name=bmw-320i"),
+    "manoeuvre": ("vehicle.name=bmw-320i", "sample.name=step-steer"),
+    "point": ("sample.steps=5",),
+}
 
 
 def small(*assignments: str) -> Experiment:
@@ -53,6 +69,8 @@ def tasks() -> list[Task]:
         recipes.fit_edmd(small("fit-edmd.terms=bilinear", "fit-edmd.basis=total", "fit-edmd.order=2")),
         recipes.fit_edmd(small("fit-edmd.terms=generator", "fit-edmd.basis=anisotropic", "fit-edmd.order=1")),
         recipes.fit_edmd(small("fit-edmd.basis=thin-plate", "fit-edmd.centres=9", "fit-edmd.placement=drawn")),
+        recipes.fit_eigen(small(*AHEAD)),
+        *(recipes.simulation(small(f"sample.kind={kind}", *more)) for kind, more in OTHERS.items()),
         grid.sweep(parse_grid([*SMALL[:2], "fit-edmd.order=1,2", "test.box.count=20"]), cells),
         figure_tasks.figure("rmse-histogram", [scored], "svg", plain),
     ]

@@ -11,6 +11,8 @@ from koopcli.errors import InvalidValueError
 from koopcli.figures.kit.registry import FIGURES
 from koopcli.stages import figure_tasks, recipes
 from koopcli.stages.grid import cells
+from koopcli.stages.recorded import recipe_of
+from koopcli.store.identity import key_of
 
 FITS = ("fit-edmd", "fit-eigen")
 ABOUT = {None: "paper", "fit-edmd": "best-edmd", "fit-eigen": "best-eigen"}
@@ -28,6 +30,18 @@ def test_the_best_experiments_say_which_fit_they_are_about():
     found = recipes.evaluation(load_experiment("best-edmd", {})).input("predictor")
     assert (found.stage, found.settings.terms.kind) == ("fit-edmd", "generator")
     assert recipes.evaluation(load_experiment("paper", {})).input("predictor").stage == "fit-edmd"
+
+
+def test_the_chunk_of_a_fit_is_in_its_key_where_it_has_an_effect():
+    """Not where inputs are averaged over at once: there every size of a chunk is the same artefact."""
+    grid, box = (
+        {
+            key_of(recipe_of(recipes.fit_edmd(load_experiment("paper", parse_set([*data, *chunk]))), {}))
+            for chunk in ([], ["fit-edmd.chunk=77"])
+        }
+        for data in ([], ["sample.kind=box"])
+    )
+    assert (len(grid), len(box)) == (1, 2)
 
 
 @pytest.mark.parametrize("fit", FITS)

@@ -8,7 +8,9 @@ from dataclasses import replace
 
 import pytest
 
+from koopcli.choices import Choice, setting
 from koopcli.figures.kit import style
+from koopcli.koopman.bases.basis import BasisChoice
 from koopcli.simulation import integrate
 from koopcli.stages.base import Task
 from koopcli.stages.recorded import recipe_of
@@ -63,6 +65,22 @@ def test_a_new_setting_changes_no_key(stage, monkeypatch):
         made_of = {f.name: getattr(settings, f.name) for f in dataclasses.fields(cls)}
         assert key_of(recipe_of(Task(stage, more(**made_of)), {})) == before
         assert key_of(recipe_of(Task(stage, more(**made_of, novel=4)), {})) != before
+
+
+def test_a_new_kind_changes_no_key(monkeypatch):
+    """Of a basis, with settings of its own."""
+
+    def keys():
+        of = [settings for settings, _ in TOYS["fit-edmd"]]
+        return [key_of(recipe_of(Task("fit-edmd", settings), {})) for settings in of]
+
+    before, kinds = keys(), BasisChoice.kinds()
+    novel = dataclasses.make_dataclass(
+        "NovelBasis", [("size", int, setting(4, help="how large"))], bases=(Choice,), frozen=True,
+        namespace={"kind": "novel"},
+    )  # fmt: skip
+    monkeypatch.setattr(BasisChoice, "kinds", lambda: {**kinds, "novel": novel})
+    assert keys() == before
 
 
 def test_results_and_versions_agree(stage_and_made, pins):

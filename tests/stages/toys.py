@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from dataclasses import MISSING, fields, is_dataclass, replace
 from pathlib import Path
 
@@ -488,7 +489,12 @@ def changed_defaults(pins: dict[str, dict], now: dict[str, dict[str, object]]) -
 
 
 def write_pins() -> None:
-    """Pin every stage's results and defaults beside its version."""
+    """Pin every stage's results and defaults beside its version; refuse what has changed at the same version."""
+    old = json.loads(PINS.read_text())
+    results_changed = (complaint(stage, old, made(stage)) for stage in STAGES if stage in old)
+    wrong = [*changed_defaults(old, defaults()), *(text for text in results_changed if text and "raise" in text)]
+    if wrong:
+        sys.exit("\n".join(wrong))
     pins = {
         stage: {"version": STAGES[stage].version, "defaults": defaults()[stage], "results": results(made(stage))}
         for stage in STAGES
