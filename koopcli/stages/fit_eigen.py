@@ -100,6 +100,7 @@ def _check(task: Task) -> None:
     states = plant.plant.states
     fit.eigenvalues.check()
     fit.window.check(states)
+    fit.check_scale(len(states))
     eigenfunctions.check_window(plant.steps, fit, plant.dt)
     eigenfunctions.check_modes(fit.eigenvalues.count(len(states)), fit.window.length(fit, plant.steps, plant.dt))
     images(fit.mirror, plant.vehicle, states.names)

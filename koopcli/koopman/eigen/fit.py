@@ -44,6 +44,13 @@ class FitEigen(Settings):
     radial_power: float = setting(
         1.0, above=0, high=10, help="distances: power of the distance from standstill; below 1 the middle is spread out"
     )
+    scale: tuple[float, ...] = setting(
+        (),
+        empty=True,
+        above=0,
+        high=1e6,
+        help="distances: what counts as one, as a share of the largest magnitude of each state; else all of it",
+    )
     mirror: tuple[Mirror, ...] = setting(
         (),
         unique=True,
@@ -64,7 +71,14 @@ class FitEigen(Settings):
         size = np.abs(x).max(axis=(0, 1))
         raw = isinstance(self.lift, NearestLift) and self.radial_power == 1.0
         scale = np.ones(x.shape[2]) if raw else np.where(size > 0, size, 1.0)
-        return Search(self.lift, scale, self.radial_power)
+        return Search(self.lift, scale * np.asarray(self.scale or 1.0), self.radial_power)
+
+    def check_scale(self, states: int) -> None:
+        """Raise ``InvalidValueError`` where ``scale`` is not of so many ``states``."""
+        if self.scale and len(self.scale) != states:
+            raise InvalidValueError(
+                f"'fit-eigen.scale' has {len(self.scale)} numbers for {states} states: give one for each"
+            )
 
 
 def fit(trajectories: Trajectories, how: FitEigen, images: int = 1, progress: Progress = silent) -> Predictor:
@@ -92,7 +106,13 @@ def _windows(x: FloatArray, length: int) -> Windows:
 def check_window(steps: int, how: FitEigen, dt: float) -> None:
     """Raise ``InvalidValueError`` where a table and the horizon after it do not fit into ``steps``."""
     tabulated, horizon = how.tabulated(dt), how.window.horizon_steps(how, steps, dt)
-    if tabulated >= steps and not how.window.rounds:
+    composed = how.window.lookup_steps is not None
+    if composed and how.window.lookup_steps > steps:
+        raise InvalidValueError(
+            f"'fit-eigen.lookup_steps' of {how.window.lookup_steps} is longer than trajectories of {steps} steps: look "
+            "up fewer, or simulate more"
+        )
+    if tabulated >= steps and not (how.window.rounds or composed):
         raise InvalidValueError(
             f"'fit-eigen.tabulate' of {tabulated * dt:g} s leaves nothing of trajectories of {steps * dt:g} s: a "
             "looked-up state is followed to the end of its trajectory; tabulate less, or simulate more steps"
@@ -102,10 +122,11 @@ def check_window(steps: int, how: FitEigen, dt: float) -> None:
             f"'fit-eigen.horizon' of {horizon * dt:g} s is longer than trajectories of {steps * dt:g} s: simulate more "
             "steps, or ask for a shorter horizon"
         )
-    if tabulated + horizon > steps and not how.window.rounds:
+    if tabulated + horizon > steps and not (how.window.rounds or composed):
         raise InvalidValueError(
             f"trajectories of {steps * dt:g} s do not hold the horizon of {horizon * dt:g} s after each of the first "
-            f"{tabulated * dt:g} s: tabulate less, simulate more steps, or continue them (fit-eigen.rounds)"
+            f"{tabulated * dt:g} s: tabulate less, simulate more steps, continue them (fit-eigen.rounds), or compose "
+            "shorter lookups (fit-eigen.lookup_steps)"
         )
     if tabulated > steps:
         raise InvalidValueError(

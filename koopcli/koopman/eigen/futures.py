@@ -12,7 +12,7 @@ from koopcli.koopman.eigen.frames import FRAMES
 from koopcli.koopman.eigen.nodes import Nodes
 from koopcli.koopman.predictor.lifts import Observed
 from koopcli.koopman.predictor.modes import Modes
-from koopcli.records import OF_STATES, Array, FloatArray, IndexArray, Packed
+from koopcli.records import OF_STATES, Array, FloatArray, IndexArray, Meta, Packed
 
 TOGETHER = 4096  # states lifted at once
 LARGEST_TABLE = 3e8  # bytes of what follows all nodes; a larger one is not made
@@ -25,7 +25,8 @@ class Futures(Content):
 
     ``trajectories`` (J, samples, n_x); ``nodes``: those of their samples that are looked up; ``frame``: in which what
     follows them is interpolated; ``projection`` (L, horizon + 1): from the samples of a future to the states of a
-    block of ``modes``, of which each state of the plant has one.
+    block of ``modes``, of which each state of the plant has one. A lookup gives ``lookup_steps`` steps, the next one
+    begins where it ends (7.20); one alone gives the whole horizon if None.
     """
 
     trajectories: FloatArray
@@ -33,6 +34,7 @@ class Futures(Content):
     frame: str
     projection: FloatArray
     modes: Modes
+    lookup_steps: int | None = None
 
     kind = "futures"
 
@@ -41,16 +43,31 @@ class Futures(Content):
         """Dimension N of the lifted state."""
         return len(self.modes)
 
+    @property
+    def horizon(self) -> int:
+        """Steps that a lifted state holds."""
+        return self.projection.shape[1] - 1
+
+    @property
+    def ahead(self) -> int:
+        """Steps that one lookup gives."""
+        return self.horizon if self.lookup_steps is None else min(self.lookup_steps, self.horizon)
+
     def future(self, x: FloatArray) -> FloatArray:
         """What follows the states ``x`` (n, n_x), interpolated: (n, horizon + 1, n_x). The first sample is x."""
-        n, samples, n_x = len(x), self.projection.shape[1], x.shape[1]
-        out = np.empty((n, samples, n_x))
-        frame = FRAMES[self.frame]
-        for start in range(0, n, TOGETHER):
-            here = x[start : start + TOGETHER]
-            seen = self._combined(here).reshape(len(here), samples, n_x)
-            out[start : start + TOGETHER] = frame.back(seen, here, self.modes.dt)
+        out = np.empty((len(x), self.horizon + 1, x.shape[1]))
+        for start in range(0, len(x), TOGETHER):
+            rows = slice(start, start + TOGETHER)
+            out[rows, : self.ahead + 1] = self._looked_up(x[rows])
+            for k in range(self.ahead, self.horizon, self.ahead):
+                left = self.horizon - k
+                out[rows, k + 1 : k + 1 + self.ahead] = self._looked_up(out[rows, k])[:, 1 : left + 1]
         return out
+
+    def _looked_up(self, x: FloatArray) -> FloatArray:
+        """What one lookup gives of what follows the states ``x`` (n, n_x), (n, ahead + 1, n_x)."""
+        seen = self._combined(x).reshape(len(x), self.ahead + 1, x.shape[1])
+        return FRAMES[self.frame].back(seen, x, self.modes.dt)
 
     def lift(self, x: FloatArray) -> FloatArray:
         """ψ(x) (n, N) of the states (n, n_x)."""
@@ -66,7 +83,7 @@ class Futures(Content):
         return partial(self.observe, rows=rows)
 
     def _combined(self, x: FloatArray) -> FloatArray:
-        """The weighted sums of the nodes' futures, (n, samples · n_x)."""
+        """The weighted sums of the nodes' futures, (n, (ahead + 1) · n_x)."""
         from scipy.sparse import csr_matrix  # noqa: PLC0415  (what only reads a predictor goes without)
 
         indices, weights = self.nodes.find(x)
@@ -78,7 +95,7 @@ class Futures(Content):
 
     def _gathered(self, indices: IndexArray, weights: FloatArray) -> FloatArray:
         """The same where a table of all nodes would be too large: what follows those that are found."""
-        gathered = np.empty((len(indices), self.projection.shape[1] * self.trajectories.shape[2]))
+        gathered = np.empty((len(indices), self._width))
         for start in range(0, len(indices), GATHERED):
             rows = slice(start, start + GATHERED)
             values = self._values_of(indices[rows].ravel()).reshape(*indices[rows].shape, -1)
@@ -86,18 +103,23 @@ class Futures(Content):
         return gathered
 
     @property
+    def _width(self) -> int:
+        """Numbers that follow a node."""
+        return (self.ahead + 1) * self.trajectories.shape[2]
+
+    @property
     def _table_bytes(self) -> float:
-        return 8.0 * len(self.nodes.kept) * float(self.projection.shape[1] * self.trajectories.shape[2])
+        return 8.0 * len(self.nodes.kept) * self._width
 
     @cached_property
     def _values(self) -> FloatArray:
-        """What follows every node, in the frame, (nodes, samples · n_x)."""
+        """What follows every node, in the frame, (nodes, (ahead + 1) · n_x)."""
         return self._values_of(np.arange(len(self.nodes.kept)))
 
     def _values_of(self, nodes: IndexArray) -> FloatArray:
-        """What follows some ``nodes`` (m,), (m, samples · n_x)."""
+        """What follows some ``nodes`` (m,), (m, (ahead + 1) · n_x)."""
         j, k = self.nodes.trajectory[nodes], self.nodes.sample[nodes]
-        ahead = self.trajectories[j[:, np.newaxis], k[:, np.newaxis] + np.arange(self.projection.shape[1])]
+        ahead = self.trajectories[j[:, np.newaxis], k[:, np.newaxis] + np.arange(self.ahead + 1)]
         return np.asarray(FRAMES[self.frame].seen(ahead, self.modes.dt).reshape(len(j), -1))
 
     def pack(self) -> Packed:
@@ -108,11 +130,13 @@ class Futures(Content):
             "projection": Array(self.projection, ("state_of_block", "sample_ahead"), "1"),
             **nodes.arrays,
         }
-        return Packed(arrays, {"kind": self.kind, "frame": self.frame, "search": nodes.meta})
+        meta: Meta = {"kind": self.kind, "frame": self.frame, "search": nodes.meta}
+        return Packed(arrays, meta if self.lookup_steps is None else {**meta, "lookup_steps": self.lookup_steps})
 
     @classmethod
     def unpack(cls, packed: Packed, modes: Modes) -> Futures:
         """The inverse of :meth:`pack`."""
         trajectories = packed.arrays["trajectories"].values[...]
         nodes = Nodes.unpack(Packed(packed.arrays, packed.meta["search"]), trajectories)
-        return cls(trajectories, nodes, packed.meta["frame"], packed.arrays["projection"].values[...], modes)
+        projection, meta = packed.arrays["projection"].values[...], packed.meta
+        return cls(trajectories, nodes, meta["frame"], projection, modes, meta.get("lookup_steps"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,7 +33,7 @@ def held_back(
     group, such as mirror images, are held back together; ``predict(part, x0)`` gives what a predictor of a part of the
     nodes says, (n, horizon + 1, n_x).
     """
-    nodes, horizon = futures.nodes, futures.projection.shape[1] - 1
+    nodes, horizon = futures.nodes, futures.horizon
     members = np.unique(groups)
     _, first = np.unique(groups, return_index=True)
     count = known + 1
@@ -48,9 +49,8 @@ def held_back(
         progress(done, len(folds))
         rows = np.flatnonzero(of_group[j] == group)
         rest = nodes.only(np.flatnonzero(of_group[nodes.trajectory] != group))
-        part = Futures(futures.trajectories, rest, futures.frame, futures.projection, futures.modes)
         try:
-            error[rows] = rmse(predict(part, x[rows]), truth[rows])
+            error[rows] = rmse(predict(replace(futures, nodes=rest), x[rows]), truth[rows])
         except InvalidValueError as reason:
             raise InvalidValueError(f"with trajectories held back for fit-eigen.trust, {reason}") from reason
     scored = np.isfinite(error)

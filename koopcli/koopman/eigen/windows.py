@@ -33,6 +33,8 @@ class Window(Choice):
 
     rounds: int = 0
     """How often trajectories that are too short for their table are continued."""
+    lookup_steps: int | None = None
+    """Steps that one lookup gives, where several are composed."""
 
     @property
     def cut(self) -> float | None:
@@ -116,6 +118,13 @@ class Ahead(Window):
         help="interpolate states, or the motion as seen from outside, turned back by the predicted yaw",
     )
     rounds: int = setting(0, low=0, high=100, help="how often short trajectories are continued by the predictor itself")
+    lookup_steps: int | None = setting(
+        None,
+        low=1,
+        high=1_000_000,
+        option=True,
+        help="steps that one lookup gives, the next one beginning where it ends; else the whole horizon at once",
+    )
     trust: bool = setting(False, option=True, help="estimate errors from data held back, for a bound at every state")
     cut: float | None = setting(None, low=0, high=0.5, option=True, help=boundary.CUT)
 
@@ -132,10 +141,16 @@ class Ahead(Window):
         return self.horizon_steps(how, steps, dt)
 
     def check(self, states: Channels) -> None:
-        """Raise ``InvalidValueError`` for rounds without a horizon, and for a frame that the ``states`` do not tell."""
+        """Raise ``InvalidValueError`` for rounds without a horizon or with composed lookups, which need none, and for a
+        frame that the ``states`` do not tell.
+        """
         if self.rounds and self.horizon is None:
             raise InvalidValueError(
                 "'fit-eigen.rounds' continues trajectories over the horizon: set fit-eigen.horizon too"
+            )
+        if self.rounds and self.lookup_steps is not None:
+            raise InvalidValueError(
+                "'fit-eigen.rounds' has no effect with fit-eigen.lookup_steps: a short lookup needs no continuation"
             )
         check_frame(self.coordinates, states)
 
@@ -153,12 +168,16 @@ class Ahead(Window):
         known = min(x.shape[1] - 1 - horizon, tabulated)
 
         def futures(data: FloatArray, samples: int) -> Futures:
-            return Futures(data, nodes_of(data, samples, search, how.nodes), self.coordinates, onto, modes)
+            nodes = nodes_of(data, samples, search, how.nodes)
+            return Futures(data, nodes, self.coordinates, onto, modes, self.lookup_steps)
 
-        lift = futures(x, known + 1)
-        for _ in range(self.rounds if tabulated > known else 0):
-            ahead = lift.future(x[:, -1])[:, 1 : tabulated - known + 1]
-            lift = futures(np.concatenate([x, ahead], axis=1), tabulated + 1)
+        if self.lookup_steps is not None:
+            lift = futures(x, min(x.shape[1] - 1 - self.lookup_steps, tabulated) + 1)
+        else:
+            lift = futures(x, known + 1)
+            for _ in range(self.rounds if tabulated > known else 0):
+                ahead = lift.future(x[:, -1])[:, 1 : tabulated - known + 1]
+                lift = futures(np.concatenate([x, ahead], axis=1), tabulated + 1)
         C = boundary.read_off(n_x, len(modes.rates))
         rank, condition = int(time.kept(cut).sum()), boundary.condition_of(time.singular)
         regression = Regression(rank, len(modes.rates), condition, missed=boundary.missed_ahead(x, time, cut))
