@@ -55,7 +55,7 @@ ExperimentOption = Annotated[
         "--experiment",
         metavar="NAME|FILE",
         autocompletion=complete_experiment,
-        help="Where settings come from: paper, best-edmd, best-eigen, smoke or a TOML file.",
+        help="Where settings come from: paper, best-edmd, best-eigen, quick-eigen, smoke or a TOML file.",
     ),
 ]
 VehicleOption = Annotated[

@@ -29,7 +29,7 @@ COASTING = Gain(
 TYRES = Gain(
     "rimac-2018",
     66.29,
-    0.3702,
+    0.06929,
     "koop evaluate --set experiment.fit=fit-eigen --vehicle rimac-2018",
     "koop evaluate --experiment best-eigen --vehicle rimac-2018",
 )

@@ -73,7 +73,11 @@ class Evaluate:
         None, low=0, high=1_000_000, help="first scored sample; else 1 for the plant 'forces' and 0 for 'slips'"
     )
     chunk: int = setting(2048, low=1, high=100_000_000, help="trajectories for each committed part")
-    relift: bool = setting(True, help="score predictions that are lifted afresh at every step too")
+    relift: bool | None = setting(
+        None,
+        help="score predictions that are lifted afresh at every step too; else unless a lift composes lookups, which "
+        "would take minutes",
+    )
     restart: int | None = setting(
         None,
         low=1,

@@ -28,6 +28,7 @@ BESIDE = {
     "EDMD, thin-plate, 300 centres": FitEdmd.of(basis="thin-plate", centres=300),
     "EDMD, total, order 9": FitEdmd.of(basis="total", order=9),
 }  # of the same trajectories
+PAIRS, HIGHEST, FINER = 14, 40.0, 1e-12  # of a comb of 90 functions: its pairs, rad/s, and the cut
 STATES = 3  # of the plant on tyres
 
 
@@ -68,7 +69,7 @@ def cells(experiment: Experiment) -> Iterator[tuple[BeyondCell, Task]]:
     for vehicle, own in everywhere:
         yield from _cells({ABLATION: ablation(own), MODES: sweep(own)}, vehicle, own, seeds[0])
     for (vehicle, own), seed in product(unseen(experiment), seeds):
-        yield from _cells({UNSEEN: [best_row(own)]}, vehicle, own, seed)
+        yield from _cells({UNSEEN: [quick_row(own), best_row(own)]}, vehicle, own, seed)
 
 
 def _cells(
@@ -106,6 +107,11 @@ def best(experiment: Experiment, seed: int) -> Task:
     return evaluated(best_row(experiment), experiment, seed)
 
 
+def quick(experiment: Experiment, seed: int) -> Task:
+    """The evaluation of quick-eigen on the test states of a seed."""
+    return evaluated(quick_row(experiment), experiment, seed)
+
+
 def ladder(experiment: Experiment) -> Iterator[Row]:
     """From the paper's reading to the best predictor, an ingredient at a time."""
     gamma, paper = surface(experiment), optimal(experiment, CUT)
@@ -124,11 +130,12 @@ def ladder(experiment: Experiment) -> Iterator[Row]:
     yield Row("comb, linear, world", "greedy", filled, linear.but(coordinates="world"))
     world = splines.but(coordinates="world")
     yield Row("comb, splines, world", "greedy", filled, world)
-    mirrored, fit = greedy(experiment), best_fit(experiment)
+    mirrored, fit = greedy(experiment), quick_fit(experiment)
     world = world.but(mirror=mirrored.mirror)
     yield Row("the same with images", "greedy, images", mirrored, world)
     spread = world.but(radial_power=fit.radial_power, spacing=fit.lift.spacing, nodes=None)
     yield Row("and distances, neighbours", "greedy, images", mirrored, spread)
+    yield quick_row(experiment)
     yield best_row(experiment)
 
 
@@ -145,20 +152,28 @@ def shells_row(
     return Row("comb, linear", f"{SHELLS} shells, {spread}", states, AHEAD.but(tabulate=SHELL_TABLE, lift="linear"))
 
 
+def quick_row(experiment: Experiment) -> Row:
+    """The last rung of the ladder with one lookup."""
+    return Row("and continuation: quick-eigen", "greedy, images", greedy(experiment), quick_fit(experiment))
+
+
 def best_row(experiment: Experiment) -> Row:
     """The last rung of the ladder."""
-    return Row("and continuation: best-eigen", "greedy, images", greedy(experiment), best_fit(experiment))
+    return Row("and composed lookups: best-eigen", "greedy, images", greedy(experiment), best_fit(experiment))
 
 
 def budgets(experiment: Experiment) -> Iterator[Row]:
-    """The best predictor on other budgets, and on all of them without mirror images."""
+    """The best predictors on other budgets, and on all of them without mirror images; with more rates."""
     main, *others = experiment.reproduce.budgets
-    fit = best_fit(experiment).but(trust=False)
-    alone = fit.but(mirror=())
-    yield Row("best-eigen without images", "greedy", greedy(experiment, main, plain=True), alone)
-    for budget in others:
-        yield Row("best-eigen without images", "greedy", greedy(experiment, budget, plain=True), alone)
-        yield Row("best-eigen", "greedy, images", greedy(experiment, budget), fit)
+    for name, shipped in ((recipes.QUICK, quick_fit(experiment)), (recipes.BEST, best_fit(experiment))):
+        fit = shipped.but(trust=False)
+        alone = fit.but(mirror=())
+        yield Row(f"{name} without images", "greedy", greedy(experiment, main, plain=True), alone)
+        for budget in others:
+            yield Row(f"{name} without images", "greedy", greedy(experiment, budget, plain=True), alone)
+            yield Row(name, "greedy, images", greedy(experiment, budget), fit)
+    for budget in (main, max(others, default=main)):
+        yield Row(f"{recipes.BEST}, more rates", "greedy, images", greedy(experiment, budget), more_rates(experiment))
 
 
 def beside(experiment: Experiment) -> Iterator[Row]:
@@ -173,19 +188,19 @@ def ablation(experiment: Experiment) -> Iterator[Row]:
     samples = round(best.tabulate / experiment.simulate.dt) - round(
         (written(best)["horizon"] or HORIZON) / experiment.simulate.dt
     )
-    shorter = best.but(rounds=0, tabulate=samples * experiment.simulate.dt)
+    at_once = best.but(lookup_steps=None, tabulate=samples * experiment.simulate.dt)
     less: list[tuple[str, SampleChoice, FitEigen]] = [
         ("rates: lattice", states, best.but(eigenvalues="dmd")),
         ("lift: linear", states, best.but(lift="linear")),
         ("lift: moving least squares", states, best.but(lift="mls")),
         ("lift: nearest sample", states, best.but(lift="nearest")),
         ("coordinates: state", states, best.but(coordinates="state")),
-        ("distances: plain", states, best.but(radial_power=1.0)),
+        ("distances: plain", states, best.but(radial_power=1.0, scale=())),
         ("neighbours: any", states, best.but(spacing=None)),
-        ("no continuation", states, shorter),
+        ("one lookup", states, at_once),
         ("no images", greedy(experiment, plain=True), best.but(mirror=())),
         ("all starts on Γ", _on_surface(experiment, states), best),
-        ("window: trajectory", states, _along(shorter)),
+        ("window: trajectory", states, _along(at_once)),
     ]
     for label, sample, fit in less:
         yield Row(label, "surface" if isinstance(sample, EllipsoidSample) else "greedy", sample, fit)
@@ -201,8 +216,8 @@ def _on_surface(experiment: Experiment, like: GreedySample) -> EllipsoidSample:
 
 
 def sweep(experiment: Experiment) -> Iterator[Row]:
-    """How many rates of which kind, everything else as in the best predictor but for what takes long."""
-    best = best_fit(experiment).but(rounds=0, tabulate=TABLE, trust=False, spacing=None, nodes=THINNED)
+    """How many rates of which kind, everything else as in quick-eigen but for what takes long."""
+    best = quick_fit(experiment).but(rounds=0, tabulate=TABLE, trust=False, spacing=None, nodes=THINNED)
     for fit in recipes.mode_fits(best, experiment.reproduce.pairs):
         modes = fit.eigenvalues.count(STATES)
         yield Row(fit.eigenvalues.kind, "greedy, images", greedy(experiment), fit, modes)
@@ -218,6 +233,16 @@ def unseen(experiment: Experiment) -> list[tuple[str, Experiment]]:
 def best_fit(experiment: Experiment) -> FitEigen:
     """The fit of the experiment best-eigen."""
     return recipes.best_eigen(experiment).fit_eigen
+
+
+def quick_fit(experiment: Experiment) -> FitEigen:
+    """The fit of the experiment quick-eigen."""
+    return recipes.best_eigen(experiment, name=recipes.QUICK).fit_eigen
+
+
+def more_rates(experiment: Experiment) -> FitEigen:
+    """The fit of best-eigen with a finer and wider comb."""
+    return best_fit(experiment).but(pairs=PAIRS, highest=HIGHEST, cut=FINER, trust=False)
 
 
 def greedy(experiment: Experiment, budget: float | None = None, *, plain: bool = False) -> GreedySample:

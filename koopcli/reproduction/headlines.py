@@ -127,11 +127,14 @@ def _eigen_race(experiment: Experiment) -> Race:
 
 
 def _beyond_numbers(runs: Sequence[Run]) -> list[Number]:
-    """The last rung of the ladder of each vehicle."""
-    scores = {vehicle: _of_vehicle(runs, vehicle, beyond_cells.best) for vehicle in _vehicles(runs[0])}
-    return [
-        Number(f"best-eigen, {vehicle}", "–", [*map(mean_text, each)]) for vehicle, each in scores.items() if any(each)
-    ]
+    """The last rungs of the ladder of each vehicle."""
+    rungs = {recipes.QUICK: beyond_cells.quick, recipes.BEST: beyond_cells.best}
+    scores = {
+        f"{name}, {vehicle}": _of_vehicle(runs, vehicle, task)
+        for vehicle in _vehicles(runs[0])
+        for name, task in rungs.items()
+    }
+    return [Number(label, "–", [*map(mean_text, each)]) for label, each in scores.items() if any(each)]
 
 
 def _beyond_clause(run: Run) -> str | None:

@@ -52,6 +52,7 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
 def _chunk(settings: Evaluate, inputs: Inputs, rows: slice, progress: Progress) -> Packed:
     trajectories = inputs["trajectories"].finished()
     assert settings.first is not None, "settled from the plant"
+    assert settings.relift is not None, "settled from the predictor"
     parts = []
     for block in blocks(rows, _together(trajectories.steps)):
         part = within(progress, block.start - rows.start, block.stop - rows.start, rows.stop - rows.start)
@@ -113,16 +114,16 @@ def _check(task: Task) -> None:
 def _estimate(task: Task) -> Cost:
     test, settings = task.input("trajectories"), task.settings
     n, steps = test.ancestor("sample").settings.trajectories, test.settings.steps
-    about, kinds = outlook(task.input("predictor")), 1 + settings.relift
+    about, kinds = outlook(task.input("predictor")), 1 + bool(settings.relift)
     turns = steps * -(-n // min(settings.chunk, _together(steps)))
-    seconds = settings.relift * turns * about.a_step
+    seconds = bool(settings.relift) * turns * about.a_step
     seconds += n * steps * (6e-9 * (about.functions + 100) + kinds * about.a_state)
     return Cost(seconds, 13e3 + 115.0 * n * -(-steps // (settings.restart or steps)))
 
 
 STAGE = Stage(
     name="evaluate",
-    version=5,
+    version=6,
     settings=lambda values: build(Evaluate, values),
     run=_run,
     unpack=Evaluation.unpack,

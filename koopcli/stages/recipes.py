@@ -22,6 +22,7 @@ from koopcli.stages.fit_edmd import is_product
 from koopcli.stages.roles import as_inputs
 from koopcli.vehicles.plants import PLANTS
 
+BEST, QUICK = "best-eigen", "quick-eigen"  # with composed lookups, and with one
 BESIDE = (FitEdmd.of(basis="states"), FitEdmd.of(order=3), FitEdmd.of(order=5))  # of any trajectories, to compare with
 
 
@@ -108,7 +109,10 @@ def evaluation(experiment: Experiment, of: Task | None = None, on: Task | None =
     first = experiment.evaluate.first
     if first is None:
         first = trajectories.settings.plant.first
-    settings = replace(experiment.evaluate, first=first)
+    relift = experiment.evaluate.relift
+    if relift is None:
+        relift = not (scored.stage == "fit-eigen" and scored.settings.window.lookup_steps is not None)
+    settings = replace(experiment.evaluate, first=first, relift=relift)
     return Task("evaluate", settings, (("predictor", scored), ("trajectories", trajectories)))
 
 
@@ -131,17 +135,19 @@ def mode_fits(fit: FitEigen, pairs: Sequence[int]) -> list[FitEigen]:
     ]
 
 
-def best_eigen(experiment: Experiment, budget: float | None = None) -> Experiment:
-    """The experiment with the sample and the fit of best-eigen, for its own vehicle and period and its main budget."""
+def best_eigen(experiment: Experiment, budget: float | None = None, name: str = BEST) -> Experiment:
+    """The experiment with the sample and the fit of best-eigen, or of the experiment ``name``, for its own vehicle and
+    period and its main budget.
+    """
     main = experiment.reproduce.budgets[0]
-    best = _best_eigen(main if budget is None else budget)
+    best = _best_eigen(main if budget is None else budget, name)
     simulate = replace(experiment.simulate, plant=None, steps=None)
     return replace(best, simulate=simulate, evaluate=experiment.evaluate)
 
 
 @cache
-def _best_eigen(budget: float) -> Experiment:
-    return load_experiment("best-eigen", {"sample": {"greedy": {"budget": budget}}})
+def _best_eigen(budget: float, name: str) -> Experiment:
+    return load_experiment(name, {"sample": {"greedy": {"budget": budget}}})
 
 
 def side_by_side(experiment: Experiment) -> list[Task]:

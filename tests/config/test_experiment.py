@@ -257,7 +257,7 @@ def test_a_bad_experiment_file_is_refused_by_file_and_key(tmp_path, text, says):
 
 
 def test_an_unknown_experiment_lists_the_shipped_ones():
-    with pytest.raises(UnknownNameError, match=r"known: best-edmd, best-eigen, paper, smoke"):
+    with pytest.raises(UnknownNameError, match=r"known: best-edmd, best-eigen, paper, quick-eigen, smoke"):
         load_experiment("papre", {})
 
 

@@ -375,16 +375,16 @@ TOYS = {
         (Baseline(kind="linearisation"), {"trajectories": _trajectories(1)}),
     ],
     "evaluate": [
-        (Evaluate(chunk=100, first=1), {"predictor": _predictor(), "trajectories": _trajectories(4)}),
-        (Evaluate(chunk=100, first=1), {"predictor": _predictor(growth=250.0), "trajectories": _trajectories(4)}),
-        (Evaluate(chunk=100, first=0), {"predictor": _looked_up(), "trajectories": _calm()}),
-        (Evaluate(chunk=100, first=1), {"predictor": _bilinear(), "trajectories": _trajectories(4)}),
+        (Evaluate(chunk=100, first=1, relift=True), {"predictor": _predictor(), "trajectories": _trajectories(4)}),
+        (Evaluate(chunk=100, first=1, relift=True), {"predictor": _predictor(growth=250.0), "trajectories": _trajectories(4)}),
+        (Evaluate(chunk=100, first=0, relift=True), {"predictor": _looked_up(), "trajectories": _calm()}),
+        (Evaluate(chunk=100, first=1, relift=True), {"predictor": _bilinear(), "trajectories": _trajectories(4)}),
         *(
-            (Evaluate(chunk=100, first=0), {"predictor": _forecast(kind), "trajectories": _calm()})
+            (Evaluate(chunk=100, first=0, relift=True), {"predictor": _forecast(kind), "trajectories": _calm()})
             for kind in ("hold", "rotation", "linearisation")
         ),
-        (Evaluate(chunk=2, first=1, restart=3), {"predictor": _bilinear(), "trajectories": _trajectories(4)}),
-        (Evaluate(chunk=100, first=0), {"predictor": _forecast("linearisation"), "trajectories": _steered()}),
+        (Evaluate(chunk=2, first=1, restart=3, relift=True), {"predictor": _bilinear(), "trajectories": _trajectories(4)}),
+        (Evaluate(chunk=100, first=0, relift=True), {"predictor": _forecast("linearisation"), "trajectories": _steered()}),
     ],
     "sweep": [
         (

@@ -106,11 +106,12 @@ def _windows(x: FloatArray, length: int) -> Windows:
 def check_window(steps: int, how: FitEigen, dt: float) -> None:
     """Raise ``InvalidValueError`` where a table and the horizon after it do not fit into ``steps``."""
     tabulated, horizon = how.tabulated(dt), how.window.horizon_steps(how, steps, dt)
-    composed = how.window.lookup_steps is not None
-    if composed and how.window.lookup_steps > steps:
+    lookup_steps = how.window.lookup_steps
+    composed = lookup_steps is not None
+    if lookup_steps is not None and lookup_steps > steps:
         raise InvalidValueError(
-            f"'fit-eigen.lookup_steps' of {how.window.lookup_steps} is longer than trajectories of {steps} steps: look "
-            "up fewer, or simulate more"
+            f"'fit-eigen.lookup_steps' of {lookup_steps} is longer than trajectories of {steps} steps: look up "
+            "fewer, or simulate more"
         )
     if tabulated >= steps and not (how.window.rounds or composed):
         raise InvalidValueError(

@@ -16,6 +16,7 @@ from koopcli.records import OF_STATES, Array, FloatArray, IndexArray, Meta, Pack
 
 TOGETHER = 4096  # states lifted at once
 LARGEST_TABLE = 3e8  # bytes of what follows all nodes; a larger one is not made
+FEW = 8  # states for which no sparse matrix is made
 GATHERED = 128  # states whose nodes' futures are then put together at once
 
 
@@ -46,7 +47,7 @@ class Futures(Content):
     @property
     def horizon(self) -> int:
         """Steps that a lifted state holds."""
-        return self.projection.shape[1] - 1
+        return int(self.projection.shape[1]) - 1
 
     @property
     def ahead(self) -> int:
@@ -89,6 +90,8 @@ class Futures(Content):
         indices, weights = self.nodes.find(x)
         if self._table_bytes > LARGEST_TABLE:
             return self._gathered(indices, weights)
+        if len(x) <= FEW:
+            return np.asarray(np.matmul(weights[:, np.newaxis], self._values[indices])[:, 0])
         ends = np.arange(len(x) + 1) * indices.shape[1]
         table = csr_matrix((weights.ravel(), indices.ravel(), ends), shape=(len(x), len(self._values)))
         return np.asarray(table @ self._values)
@@ -105,7 +108,7 @@ class Futures(Content):
     @property
     def _width(self) -> int:
         """Numbers that follow a node."""
-        return (self.ahead + 1) * self.trajectories.shape[2]
+        return (self.ahead + 1) * int(self.trajectories.shape[2])
 
     @property
     def _table_bytes(self) -> float:

@@ -10,6 +10,8 @@ import numpy as np
 
 from koopcli.records import BoolArray, FloatArray, IndexArray
 
+ALONE = 64  # places that are not worth other threads
+TOGETHER = 64  # places whose neighbours are chosen at once
 POOL = 3  # times as many of the nearest nodes as neighbours are chosen among
 
 
@@ -33,14 +35,18 @@ class Cloud:
         if self.spacing is None:
             return self._nearest(y, self.neighbours)
         pool = self._nearest(y, min(POOL * self.neighbours, len(self.places)))
-        chosen = _spaced(self.trajectory[pool], self.sample[pool], self.spacing)
-        positions = np.arange(pool.shape[1])
-        rank = np.where(chosen, positions, positions + pool.shape[1])  # the others follow, where there are too few
-        order = np.sort(np.argsort(rank, axis=1)[:, : self.neighbours], axis=1)
-        return np.asarray(np.take_along_axis(pool, order, axis=1))
+        near = np.empty((len(y), self.neighbours), dtype=np.intp)
+        for start in range(0, len(y), TOGETHER):
+            some = pool[start : start + TOGETHER]
+            left_out = ~_spaced(self.trajectory[some], self.sample[some], self.spacing)
+            order = np.argsort(left_out, axis=1, kind="stable")[:, : self.neighbours]  # others, where they are too few
+            order.sort(axis=1)
+            near[start : start + TOGETHER] = some[np.arange(len(some))[:, np.newaxis], order]
+        return near
 
     def _nearest(self, y: FloatArray, count: int) -> IndexArray:
-        indices = np.asarray(self._tree.query(y, count, workers=-1)[1], dtype=np.intp)
+        workers = -1 if len(y) > ALONE else 1
+        indices = np.asarray(self._tree.query(y, count, workers=workers)[1], dtype=np.intp)
         return indices.reshape(len(y), count)
 
     @cached_property
@@ -52,14 +58,5 @@ class Cloud:
 
 def _spaced(trajectory: IndexArray, sample: IndexArray, spacing: int) -> BoolArray:
     """Which of each row of nodes, the nearest first, are a multiple of ``spacing`` from the first of theirs, (n, m)."""
-    n, m = trajectory.shape
-    order = np.argsort(trajectory, axis=1, kind="stable")
-    sorted_ = np.take_along_axis(trajectory, order, axis=1)
-    begins = np.ones((n, m), dtype=bool)
-    begins[:, 1:] = sorted_[:, 1:] != sorted_[:, :-1]
-    first = np.maximum.accumulate(np.where(begins, np.arange(m), 0), axis=1)
-    along = np.take_along_axis(sample, order, axis=1)
-    apart = (along - np.take_along_axis(along, first, axis=1)) % spacing == 0
-    chosen = np.empty((n, m), dtype=bool)
-    np.put_along_axis(chosen, order, apart, axis=1)
-    return chosen
+    first = (trajectory[:, :, np.newaxis] == trajectory[:, np.newaxis]).argmax(axis=2)
+    return np.asarray((sample - sample[np.arange(len(sample))[:, np.newaxis], first]) % spacing == 0)

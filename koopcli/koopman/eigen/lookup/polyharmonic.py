@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
+from functools import cache
 from typing import ClassVar
 
 import numpy as np
@@ -14,7 +14,7 @@ from koopcli.koopman.eigen.lookup.lookup import Lift
 from koopcli.koopman.eigen.lookup.mls import trend_weights
 from koopcli.records import BoolArray, FloatArray, IndexArray
 
-TOGETHER = 256  # places solved for at once
+TOGETHER = 128  # places solved for at once
 STIFF = 1e-9  # softness of a spline that meets its nodes
 LARGEST = 10.0  # sum of absolute weights, beyond which a simpler spline is taken
 SIMPLER = ((1, STIFF), (1, 1e-4), (1, 1e-2))  # degree and softness, one after the other
@@ -50,7 +50,7 @@ def _bounded(near: FloatArray) -> FloatArray:
     wild = np.flatnonzero(_wild(weights))
     for degree, softness in SIMPLER:
         if not len(wild):
-            break
+            return weights
         weights[wild] = spline_weights(near[wild], degree, softness)
         wild = wild[_wild(weights[wild])]
     weights[wild] = trend_weights(near[wild])
@@ -67,33 +67,35 @@ def spline_weights(near: FloatArray, degree: int, softness: float) -> FloatArray
     Solves [Φ + softness P; Pᵀ 0] [w; ·] = [φ; p] with Φ = |y_i - y_j|³, P the monomials to ``degree`` one or two, φ and
     p those of zero.
     """
-    n, q = near.shape[:2]
-    square = (near**2).sum(axis=2)
-    between = square[:, :, np.newaxis] + square[:, np.newaxis] - 2 * np.matmul(near, near.transpose(0, 2, 1))
-    np.maximum(between, 0.0, out=between)
-    between *= np.sqrt(between)
-    tail = _monomials(near, degree)
-    m = tail.shape[2]
+    n, q, n_x = near.shape
+    rows, columns = _products(n_x, degree)
+    linear, m = q + 1 + n_x, 1 + n_x + len(rows)
     system = np.zeros((n, q + m, q + m))
-    system[:, :q, :q] = between
-    system[:, :q, q:] = tail
-    system[:, q:, :q] = tail.transpose(0, 2, 1)
-    diagonal = np.arange(q + m)
-    system[:, diagonal[:q], diagonal[:q]] = softness
-    system[:, diagonal[q:], diagonal[q:]] = -1e-3 * STIFF  # a tail that the nodes leave open is not used
+    square = np.einsum("nqi,nqi->nq", near, near)
+    between = np.matmul(near, near.transpose(0, 2, 1))
+    between *= -2.0
+    between += square[:, :, np.newaxis]
+    between += square[:, np.newaxis]
+    np.maximum(between, 0.0, out=between)
+    np.multiply(between, np.sqrt(between), out=system[:, :q, :q])
+    system[:, :q, q] = 1.0
+    system[:, :q, q + 1 : linear] = near
+    system[:, :q, linear:] = near[:, :, rows] * near[:, :, columns]
+    system[:, q:, :q] = system[:, :q, q:].transpose(0, 2, 1)
+    diagonal = np.einsum("nii->ni", system)
+    diagonal[:, :q] = softness
+    diagonal[:, q:] = -1e-3 * STIFF  # a tail that the nodes leave open is not used
     right = np.zeros((n, q + m, 1))
     right[:, :q, 0] = square * np.sqrt(square)
     right[:, q, 0] = 1.0
     return np.asarray(np.linalg.solve(system, right)[:, :q, 0])
 
 
-def _monomials(near: FloatArray, degree: int) -> FloatArray:
-    """Monomials of ``near`` (n, q, n_x) to ``degree`` one or two, the constant first."""
-    first = [np.ones(near.shape[:2]), *near.transpose(2, 0, 1)]
-    if degree == 1:
-        return np.stack(first, axis=2)
-    pairs = combinations_with_replacement(range(near.shape[2]), 2)
-    return np.stack([*first, *(near[:, :, i] * near[:, :, j] for i, j in pairs)], axis=2)
+@cache
+def _products(n_x: int, degree: int) -> tuple[IndexArray, IndexArray]:
+    """The factors of the quadratic monomials, if the ``degree`` is two."""
+    rows, columns = np.triu_indices(n_x if degree == 2 else 0)
+    return rows, columns
 
 
 @dataclass(frozen=True)
