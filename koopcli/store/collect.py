@@ -168,8 +168,8 @@ def _artefacts(store: Store, stock: Stock, kept: set[str], before: float) -> Ite
         size = recorded.file.size + (file.size if file else 0)
         freed |= {digest} if file else set()
         yield Removal("artefact", recorded.record.name, size, (recorded.file,), (digest,) if file else (), full)
-    if any(recorded.record is None for recorded in stock.records.values()):
-        return  # what looks like an orphan may belong to a record that does not read here
+    if not stock.all_read():
+        return
     used = wanted | stock.named_by().keys()
     for digest, file in {**stock.slabs, **stock.objects}.items():
         if digest not in used and file.mtime < before:

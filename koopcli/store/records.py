@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from koopcli.errors import InvalidValueError, NewerFormatError
+from koopcli.errors import InvalidValueError, NewerFormatError, OlderFormatError
 from koopcli.parsing import parse_json
 from koopcli.store.identity import SCHEMA, canonical, key_of
 from koopcli.store.names import DIGEST, SHORT, is_name
@@ -58,7 +58,8 @@ class Record:
     def from_json(cls, text: bytes, stage: str, key: str) -> Record:
         """The record in ``text``, verified.
 
-        Raises ``BadRecordError`` for a damaged record and ``NewerFormatError`` for one of another schema.
+        Raises ``BadRecordError`` for a damaged record and ``NewerFormatError`` for one of another schema, of which an
+        older one is an ``OlderFormatError``.
         """
         try:
             content = parse_json(text)
@@ -75,7 +76,7 @@ class Record:
             if check != _check(content):
                 raise BadRecordError
             if content.pop("schema") != SCHEMA:
-                raise NewerFormatError(
+                raise OlderFormatError(
                     f"{stage}/{key[:SHORT]} was written by an older koop (format {schema}, this one reads {SCHEMA}): "
                     "make it afresh in another --store, or read it by the koop that wrote it"
                 )

@@ -7,8 +7,9 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
-from koopcli.errors import NewerFormatError
+from koopcli.errors import NewerFormatError, OlderFormatError
 from koopcli.parsing import parse_json
 from koopcli.progress import Progress, silent
 from koopcli.store.files import UntrustedFileError, read_small, reading_errors
@@ -38,7 +39,7 @@ class File:
 
 @dataclass(frozen=True)
 class Recorded:
-    """A file among the records: its ``record``, or the ``text`` of one that is ``damaged`` or of a newer format."""
+    """A file among the records: its ``record``, or the ``text`` of one that is ``damaged`` or of another ``format``."""
 
     file: File
     stage: str
@@ -46,6 +47,8 @@ class Recorded:
     record: Record | None
     damaged: bool = False
     text: bytes = b""
+    format: Literal["", "newer", "older"] = ""
+    """Which format it has, where this koop does not read it."""
 
     @property
     def full(self) -> str:
@@ -79,6 +82,10 @@ class Stock:
             if recorded.record is not None:
                 users.setdefault(recorded.record.object, []).append(recorded)
         return users
+
+    def all_read(self) -> bool:
+        """Whether every record reads here. Otherwise what looks like an orphan may belong to one that does not."""
+        return all(recorded.record is not None for recorded in self.records.values())
 
     def newest(self) -> float:
         """The latest time of any object or record, 0 in an empty store."""
@@ -154,8 +161,10 @@ def look(path: Path, stage: str, key: str) -> Recorded | None:
         return Recorded(file, stage, key, Record.from_json(text, stage, key))
     except BadRecordError:
         return Recorded(file, stage, key, None, True, text)
-    except NewerFormatError:
-        return Recorded(file, stage, key, None, False, text)
+    except NewerFormatError as error:
+        return Recorded(
+            file, stage, key, None, False, text, "older" if isinstance(error, OlderFormatError) else "newer"
+        )
 
 
 def _put_aside(file: File) -> Recorded | None:

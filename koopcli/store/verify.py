@@ -27,6 +27,13 @@ DAMAGE = (
 )
 
 
+ORPHAN = "orphan object"
+OTHER_FORMAT = {
+    "newer": "written by a newer koop; left alone: update koop",
+    "older": "written by an older koop; left alone: make it again by the same command",
+}
+
+
 @dataclass(frozen=True)
 class Finding:
     """Something that is not as the store would have it; of the kinds in ``DAMAGE`` something committed is lost.
@@ -53,9 +60,13 @@ class Finding:
 
 @dataclass(frozen=True)
 class Report:
-    """What was found among ``checked`` artefacts, of whose objects ``read`` bytes were read."""
+    """What was found among ``checked`` artefacts, of whose objects ``read`` bytes were read.
+
+    ``other_format`` more have a format that this koop does not read.
+    """
 
     checked: int
+    other_format: int
     read: int
     unfinished: int
     quarantine: int
@@ -71,7 +82,15 @@ def verify(store: Store, opens: Opens | None, progress: Progress = silent) -> Re
     stock = survey(store.root)
     objects = _Objects(store, stock, opens, progress)
     findings = [*_records(store, stock), *objects.check(), *_pins(store, stock), *_beside(store, stock)]
-    return Report(len(stock.records), objects.read, len(stock.chunks), len(stock.quarantine), tuple(findings))
+    other_format = sum(bool(recorded.format) for recorded in stock.records.values())
+    return Report(
+        checked=len(stock.records) - other_format,
+        other_format=other_format,
+        read=objects.read,
+        unfinished=len(stock.chunks),
+        quarantine=len(stock.quarantine),
+        findings=tuple(findings),
+    )
 
 
 def _records(store: Store, stock: Stock) -> Iterator[Finding]:
@@ -80,7 +99,7 @@ def _records(store: Store, stock: Stock) -> Iterator[Finding]:
         if recorded.record is None and recorded.damaged:
             yield Finding("damaged record", path, "does not match its own check or its name", full)
         elif recorded.record is None:
-            yield Finding("newer format", path, "written by a newer koop; left alone: update koop", full)
+            yield Finding(f"{recorded.format} format", path, OTHER_FORMAT[recorded.format], full)
         else:
             for role, name in recorded.record.lineage.items():
                 if name not in stock.records:
@@ -118,7 +137,7 @@ class _Objects:
                 yield Finding(problem[0], shown, problem[1], user.full)
         if not users:
             problem = self._problem(lambda: self._unused(path, digest), lambda: False)
-            if problem is not None:
+            if problem is not None and (problem[0] != ORPHAN or self.stock.all_read()):
                 yield Finding(problem[0], shown, problem[1])
 
     def _problem(
@@ -153,7 +172,7 @@ class _Objects:
                 if named(file)[0] != digest:
                     return "damaged object", "its bytes do not match its name; no record names it"
         return (
-            "orphan object",
+            ORPHAN,
             f"{size_text(size)} that no record names: koop gc removes it; after a copy that was cut off, copy again",
         )
 
@@ -177,9 +196,10 @@ def _beside(store: Store, stock: Stock) -> Iterator[Finding]:
         if key in finished:
             what = f"{len(files)} chunks of a finished artefact: the next command clears them"
             yield Finding("orphan chunks", f"partial/{key}", what, finished[key])
-    for digest in sorted(stock.slabs.keys() - stock.objects.keys() - users.keys()):
+    lone = stock.slabs.keys() - stock.objects.keys() - users.keys() if stock.all_read() else ()
+    for digest in sorted(lone):
         path = _relative(store, stock.slabs[digest].path)
-        yield Finding("orphan object", path, "the digests of an object that is not here: see koop gc")
+        yield Finding(ORPHAN, path, "the digests of an object that is not here: see koop gc")
     for _, file in stock.removing:
         yield Finding("half-removed object", _relative(store, file.path), "a `koop gc` was cut off here: run it again")
     now = max(time.time(), stock.newest())  # only to tell a file at work from litter

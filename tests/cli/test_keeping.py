@@ -15,6 +15,7 @@ from filelock import FileLock
 
 from tests.cli.test_errors import one_line
 from tests.conftest import read_all
+from tests.store.test_store import make_older
 
 DAY = 86400
 
@@ -77,7 +78,7 @@ def damage(kind: str, made, root: Path) -> None:
 
 
 DAMAGE = {
-    "damaged record": {"damaged record", "orphan object"},
+    "damaged record": {"damaged record"},
     "damaged object": {"damaged object"},
     "truncated object": {"damaged object"},
     "missing object": {"missing object"},
@@ -254,6 +255,44 @@ def test_a_record_that_unpacks_no_more(koop, made, monkeypatch):
     assert [one["kind"] for one in findings(koop("verify", "--json"))] == ["newer format"]
 
 
+def test_a_store_of_the_format_before(koop, folder, made):
+    root = folder / "artefacts"
+    for record, _ in made.values():
+        make_older(record)
+    before = tree(root)
+    for options in ([], ["--fast"], ["--repair"]):
+        told = koop("verify", "--json", *options)
+        assert told.code == 8
+        assert [one["kind"] for one in findings(told)] == ["older format"] * 3
+        assert all("make it again by the same command" in one["what"] for one in findings(told))
+        assert not any(one["damage"] for one in findings(told))
+    shown = koop("verify")
+    assert shown.out.splitlines()[-1].endswith("read: nothing is damaged; 3 of another format")
+    assert "none of the 3 artefacts has the format" in shown.err.splitlines()[-1]
+    listed = koop("ls")
+    assert listed.code == 0
+    assert [line for line in listed.err.splitlines() if "format" in line] == [
+        "warning: not listed: 3 of an older format; make them again by the same commands"
+    ]
+    one_line(koop("show", f"sample/{made['sample'][0].stem}"), 8, "written by an older koop")
+    assert tree(root) == before
+    (root / "objects" / "aa").mkdir(exist_ok=True)
+    (root / "objects" / "aa" / f"{'a' * 64}.slabs").write_bytes(b"")
+    assert {one["kind"] for one in findings(koop("verify", "--json"))} == {"older format"}
+    made["sample"][0].write_text("{")  # damage comes first
+    assert koop("verify").code == 5
+
+
+def test_records_of_the_format_before_beside_others(koop, made):
+    make_older(made["fit-edmd"][0])
+    told = koop("verify", "--json")
+    assert told.code == 0
+    assert json.loads(told.out)["checked"] == 2
+    assert json.loads(told.out)["other_format"] == 1
+    assert [one["kind"] for one in findings(told)] == ["older format"]
+    assert koop("ls").err.count("format") == 1
+
+
 def test_a_kind_that_this_koop_lacks_is_no_damage(koop, folder, made):
     from koopcli.records import Packed
     from koopcli.store import Store
@@ -292,7 +331,6 @@ def test_what_is_no_damage_is_told_and_left_alone(koop, folder, made):
     assert result.code == 0
     assert {(one["kind"], one["path"]) for one in findings(result)} == {
         ("newer format", str(newer.relative_to(root))),
-        ("orphan object", next(one["path"] for one in findings(result) if one["kind"] == "orphan object")),
         ("foreign file", "objects/notes.txt"),
         ("foreign file", "stray"),
         ("foreign file", f"records/sample/{'0' * 64}.json"),

@@ -24,6 +24,7 @@ from koopcli.store.files import make_folder, publish, size_text, sweep
 from koopcli.store.identity import SCHEMA
 from koopcli.store.names import store_root
 from koopcli.store.pins import pin, pins, unpin
+from koopcli.store.records import _check
 from tests.large import large_from
 
 
@@ -167,14 +168,17 @@ def test_a_newer_record_is_left_alone(store):
     assert path.exists()
 
 
-def test_a_record_of_an_older_format_is_named_and_left_alone(store):
-    from koopcli.store.records import _check
-
-    record = commit(store)
-    path = store.root / "records" / "sample" / f"{record.key}.json"
+def make_older(path):
+    """Give the record at ``path`` the format before."""
     old = {**json.loads(path.read_text()), "schema": SCHEMA - 1}
     del old["check"]
     path.write_text(json.dumps({**old, "check": _check(old)}))
+
+
+def test_a_record_of_an_older_format_is_named_and_left_alone(store):
+    record = commit(store)
+    path = store.root / "records" / "sample" / f"{record.key}.json"
+    make_older(path)
     before = path.read_bytes()
     with pytest.raises(NewerFormatError, match=r"written by an older koop .* make it afresh in another --store"):
         store.record("sample", record.key)
