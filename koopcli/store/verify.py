@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from koopcli.progress import Progress, silent
@@ -105,8 +105,12 @@ def _records(store: Store, stock: Stock) -> Iterator[Finding]:
                 if name not in stock.records:
                     yield Finding("input gone", path, f"its {role}, {short_name(name)}, is no longer here", full)
     for full, recorded in stock.lost.items():
-        what = "it was damaged, its recipe is whole: remove the file to give the artefact up"
-        yield Finding("record put aside", _relative(store, recorded.file.path), what, full)
+        remedy = (
+            "is whole: --repair makes it again" if recorded.recipe is not None else "is lost: run its command afresh"
+        )
+        what = f"it was damaged, its recipe {remedy}; remove the file to give the artefact up"
+        artefact = full if recorded.stage else ""
+        yield Finding("record put aside", _relative(store, recorded.file.path), what, artefact)
 
 
 @dataclass
@@ -116,10 +120,13 @@ class _Objects:
     opens: Opens | None
     progress: Progress
     read: int = 0
+    _kept: set[str] = field(default_factory=set)
+    """What records in quarantine name; gc keeps it."""
 
     def check(self) -> Iterator[Finding]:
         """Findings about the objects, missing ones included."""
         users = self.stock.named_by()
+        self._kept = {digest for lost in self.stock.lost.values() for digest in lost.named()}
         total = max(1, sum(file.size for file in self.stock.objects.values()))
         done = 0
         for digest in sorted(users.keys() | self.stock.objects):
@@ -137,7 +144,8 @@ class _Objects:
                 yield Finding(problem[0], shown, problem[1], user.full)
         if not users:
             problem = self._problem(lambda: self._unused(path, digest), lambda: False)
-            if problem is not None and (problem[0] != ORPHAN or self.stock.all_read()):
+            orphan = self.stock.all_read() and digest not in self._kept
+            if problem is not None and (problem[0] != ORPHAN or orphan):
                 yield Finding(problem[0], shown, problem[1])
 
     def _problem(

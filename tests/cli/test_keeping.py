@@ -153,6 +153,21 @@ def test_records_that_a_command_put_aside_are_repaired(koop, folder, made):
     assert len(list((root / "quarantine").iterdir())) == 3
 
 
+def test_records_that_are_cut_off_are_repaired_from_the_recipes_in_them(koop, folder, made):
+    root = folder / "artefacts"
+    for record, _ in made.values():
+        text = record.read_bytes()
+        record.write_bytes(text[: text.index(b'"lineage"')])
+    assert koop("verify", "--json").code == 5
+    assert koop("ls").err.count("put aside") == 3
+    told = koop("verify", "--json")
+    assert told.code == 5
+    assert [one["kind"] for one in findings(told) if one["damage"]] == ["record put aside"] * 3
+    assert json.loads(koop("verify", "--repair", "--json").out)["damaged"] == 0
+    assert koop("verify").code == 0
+    assert read_all(root) == 3
+
+
 def test_a_repair_that_was_cut_off_goes_on(koop, made, monkeypatch):
     from koopcli.stages.pipeline import Pipeline
 
@@ -230,7 +245,17 @@ def test_what_cannot_be_repaired_stays_in_the_list(koop, folder, made):
     record.write_text(record.read_text().replace('"order": 2', '"order": 3'))  # not even its recipe is known
     assert koop("verify", "--repair").code == 5
     assert not record.exists()
-    assert (folder / "artefacts" / "quarantine" / record.name).exists()
+    aside = folder / "artefacts" / "quarantine" / record.name
+    text = aside.read_bytes()
+    (lost,) = [one for one in findings(koop("verify", "--json")) if one["damage"]]
+    assert (lost["kind"], lost["name"]) == ("record put aside", f"fit-edmd/{record.stem[:12]}")
+    assert "run its command afresh" in lost["what"]
+    assert koop("verify", "--repair").code == 5
+    aside.unlink()
+    assert koop("verify").code == 0
+    aside.write_bytes(text)
+    assert koop("verify").code == 5
+    assert koop("fit-edmd").name == lost["name"]  # made again, it is no longer lost
     assert koop("verify").code == 0
 
 
