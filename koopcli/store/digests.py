@@ -40,12 +40,17 @@ def slabs_path(path: Path) -> Path:
     return path.with_suffix(".slabs")
 
 
+def digests_size(size: int) -> int:
+    """Bytes of the digests of the slabs of a large object of ``size`` bytes."""
+    return DIGEST * -(-size // SLAB)
+
+
 def read_digests(path: Path, name: str, size: int) -> bytes:
     """The digests of the slabs of the object ``name`` at ``path``, of ``size`` bytes.
 
     Raises ``UntrustedFileError``, and ``FileNotFoundError`` where there are none.
     """
-    wanted = DIGEST * -(-size // SLAB)
+    wanted = digests_size(size)
     with open_regular(slabs_path(path)) as (file, length):
         digests = file.read() if length == wanted else b""
     if len(digests) != wanted or hashlib.sha256(digests).hexdigest() != name:

@@ -11,7 +11,7 @@ import io
 import os
 import stat
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from itertools import count
 from pathlib import Path
 from typing import IO, Any, NoReturn
@@ -242,6 +242,29 @@ class Store:
         about, path = os.fstat(file.fileno()), self.path(record)
         aside = self._put_aside(path) if _identity(path) == (about.st_dev, about.st_ino) else "no longer"
         raise DamagedArtefactError(f"the object of {record.name} is damaged {aside}: {digests.WRONG}")
+
+    def restore_digests(self, digest: str) -> bool:
+        """See that the digests of the slabs of a large object are there, by reading it; ``False`` if it is damaged too.
+
+        Raises ``StorageError`` where they cannot be written.
+        """
+        path = self._object_path(digest)
+        beside = digests.slabs_path(path)
+        try:
+            with open_regular(path) as (file, size):
+                name, slabs = digests.named(file)
+        except (OSError, UntrustedFileError):
+            return False
+        if name != digest or not slabs:
+            return False
+        with suppress(OSError, UntrustedFileError):
+            if digests.read_digests(path, digest, size) == slabs:
+                return True
+        if os.path.lexists(beside):
+            self.put_aside(beside)
+        with storage_errors(self.root, len(slabs)):
+            self._publish(beside, slabs)
+        return True
 
     def put_aside(self, path: Path) -> None:
         """Move a damaged file to quarantine. Raises ``StorageError`` where that cannot be done."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from koopcli.progress import Progress, silent
 from koopcli.records import Packed
-from koopcli.store.digests import named
+from koopcli.store import digests
 from koopcli.store.files import HOUR, UntrustedFileError, open_regular, size_text
 from koopcli.store.names import short_name
 from koopcli.store.records import Record
@@ -22,6 +23,9 @@ DAMAGE = (
     "damaged object",
     "unreadable object",
     "missing object",
+    "damaged digests",
+    "unreadable digests",
+    "missing digests",
     "damaged pin",
     "pin of nothing",
 )
@@ -139,7 +143,11 @@ class _Objects:
         path = object_path(self.store.root, digest)
         shown = _relative(self.store, path)
         for user in users:
-            problem = self._problem(lambda user=user: self._used(user), user.file.path.exists)  # type: ignore[misc]
+            beside = self._digests(user, path)
+            if beside is not None:
+                yield Finding(beside[0], _relative(self.store, digests.slabs_path(path)), beside[1], user.full)
+            look = self._used if beside is None else self._hashed
+            problem = self._problem(partial(look, user), user.file.path.exists)
             if problem is not None:
                 yield Finding(problem[0], shown, problem[1], user.full)
         if not users:
@@ -147,6 +155,30 @@ class _Objects:
             orphan = self.stock.all_read() and digest not in self._kept
             if problem is not None and (problem[0] != ORPHAN or orphan):
                 yield Finding(problem[0], shown, problem[1])
+
+    def _digests(self, recorded: Recorded, path: Path) -> tuple[str, str] | None:
+        """What is wrong with the digests of the slabs of an object that is there."""
+        assert recorded.record is not None, "it names an object"
+        name, size = recorded.record.object, recorded.record.size
+        if size <= digests.WHOLE or not path.exists():
+            return None
+        problem = self._problem(
+            partial(self._beside, path, name, size), lambda: recorded.file.path.exists() and path.exists()
+        )
+        if problem is None:
+            return None
+        kind, what = problem
+        if kind == "missing object":
+            what = "the digests of its slabs are gone, its data are there: --repair writes them again"
+        return kind.replace("object", "digests"), what
+
+    def _beside(self, path: Path, name: str, size: int) -> tuple[str, str] | None:
+        if self.opens is not None:
+            digests.read_digests(path, name, size)
+            return None
+        with open_regular(digests.slabs_path(path)) as (_, length):
+            wanted = digests.digests_size(size)
+            return None if length == wanted else ("damaged object", f"has {length:,} bytes, not {wanted:,}")
 
     def _problem(
         self, look: Callable[[], tuple[str, str] | None], expected: Callable[[], bool]
@@ -166,18 +198,27 @@ class _Objects:
     def _used(self, recorded: Recorded) -> tuple[str, str] | None:
         assert recorded.record is not None, "it names an object"
         if self.opens is None:
-            with open_regular(self.store.path(recorded.record)) as (_, size):
-                if size != recorded.record.size:
-                    return "damaged object", f"has {size:,} bytes, not {recorded.record.size:,}"
-            return None
+            return self._hashed(recorded)
         self.read += recorded.record.size
         return self.opens(recorded.record, self.store.inspect(recorded.record))
+
+    def _hashed(self, recorded: Recorded) -> tuple[str, str] | None:
+        """Whether an object has its size and, unless the check is a fast one, bytes that match its name."""
+        assert recorded.record is not None, "it names an object"
+        with open_regular(self.store.path(recorded.record)) as (file, size):
+            if size != recorded.record.size:
+                return "damaged object", f"has {size:,} bytes, not {recorded.record.size:,}"
+            if self.opens is not None:
+                self.read += size
+                if digests.named(file)[0] != recorded.record.object:
+                    return "damaged object", digests.WRONG
+        return None
 
     def _unused(self, path: Path, digest: str) -> tuple[str, str]:
         with open_regular(path) as (file, size):
             if self.opens is not None:
                 self.read += size
-                if named(file)[0] != digest:
+                if digests.named(file)[0] != digest:
                     return "damaged object", "its bytes do not match its name; no record names it"
         return (
             ORPHAN,

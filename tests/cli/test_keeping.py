@@ -15,6 +15,7 @@ from filelock import FileLock
 
 from tests.cli.test_errors import one_line
 from tests.conftest import read_all
+from tests.large import large_from
 from tests.store.test_store import make_older
 
 DAY = 86400
@@ -166,6 +167,27 @@ def test_records_that_are_cut_off_are_repaired_from_the_recipes_in_them(koop, fo
     assert json.loads(koop("verify", "--repair", "--json").out)["damaged"] == 0
     assert koop("verify").code == 0
     assert read_all(root) == 3
+
+
+@pytest.mark.parametrize("options", [[], ["--fast"]])
+def test_digests_of_slabs_are_written_anew_and_the_artefact_only_with_its_object(koop, folder, options):
+    with large_from(1000):
+        assert koop("fit-edmd").code == 0
+        made = files(folder)
+        slabs = {stage: content.with_suffix(".slabs") for stage, (_, content) in made.items()}
+        slabs["simulate"].unlink()
+        slabs["sample"].write_bytes(b"x")
+        flip(made["sample"][1])
+        assert koop("ls").out.count("missing") == 1
+        told = koop("verify", "--json", *options)
+        assert told.code == 5
+        kinds = {(one["kind"], one["path"].partition("/")[2]) for one in findings(told)}
+        assert {kind for kind, path in kinds if path.endswith(".slabs")} == {"missing digests", "damaged digests"}
+        mended = koop("verify", "--repair", *options)
+        assert mended.code == 0
+        assert "simulate" not in "".join(line for line in mended.err.splitlines() if "made in" in line)
+        assert koop("verify").code == 0
+        assert read_all(folder / "artefacts") == 3
 
 
 def test_a_repair_that_was_cut_off_goes_on(koop, made, monkeypatch):
