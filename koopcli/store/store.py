@@ -12,6 +12,7 @@ import os
 import stat
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, suppress
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import IO, Any, NoReturn
@@ -318,5 +319,5 @@ def _verified(path: Path, record: Record, lost: Callable[[Record, io.FileIO], No
         large.verify()
     packed = image.from_open(large)
     if lost is not None:
-        large.refuse = lambda: lost(record, large)
+        large.refuse = partial(lost, record)
     return packed

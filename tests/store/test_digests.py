@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import io
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -102,6 +104,19 @@ def test_without_its_digests_an_object_is_missing(store, record):
     assert [finding.kind for finding in verify(store, lambda *_: None).findings] == ["missing digests"]
     with pytest.raises(DamagedArtefactError, match="missing"):
         store.read(record)
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="the system lists no descriptors")
+def test_a_large_object_that_was_read_is_closed_at_once(store, record):
+    gc.collect()
+    gc.disable()
+    try:
+        open_before = len(os.listdir("/proc/self/fd"))
+        for _ in range(20):
+            assert len(store.read(record).arrays) == 3
+        assert len(os.listdir("/proc/self/fd")) <= open_before
+    finally:
+        gc.enable()
 
 
 def lose(path):
