@@ -98,6 +98,19 @@ def test_large_content_goes_through_a_file(store, large):
             image.loaded(store.read(record))
 
 
+@pytest.mark.parametrize("limit", [image.IMAGE_LIMIT, 8], ids=["in memory", "by a file"])
+def test_facts_that_could_not_be_read_are_refused_before_they_are_written(store, monkeypatch, limit):
+    monkeypatch.setattr(image, "IMAGE_LIMIT", limit)
+    monkeypatch.setattr(image, "META_LIMIT", 2000)
+    room = 2000 - len('{"text": ""}')
+    whole = Packed(packed().arrays, {"text": "x" * room})
+    assert store.read(store.commit(recipe(), {}, whole, {})).meta == whole.meta
+    before = set(store.root.rglob("*"))
+    with pytest.raises(InvalidValueError, match=r"take 2\.0 kB, over 2\.0 kB"):
+        store.commit(recipe(1), {}, Packed(packed().arrays, {"text": "x" * (room + 1)}), {})
+    assert set(store.root.rglob("*")) == before
+
+
 @pytest.mark.parametrize("limit", [image.IMAGE_LIMIT, 100], ids=["in memory", "by a file"])
 @pytest.mark.parametrize("shape", [(400,), (70, 5), (3, 4, 50)])
 def test_every_value_comes_back_from_many_slabs(store, monkeypatch, limit, shape):
