@@ -1,7 +1,7 @@
 """The store: objects by digest, records by key. The record is the commit point.
 
-objects/ab/<sha256>.h5   records/<stage>/<key>.json   partial/<key>/<i>-<sha256>-<code>.h5
-refs/ (pins)   locks/   tmp/   quarantine/
+objects/ab/<sha256>.h5, of large ones <sha256>.slabs beside it   records/<stage>/<key>.json
+partial/<key>/<i>-<sha256>-<code>.h5   refs/ (pins)   locks/   tmp/   quarantine/
 """
 
 from __future__ import annotations
