@@ -55,3 +55,7 @@ class NewerFormatError(KoopError):
     """A record written by a version of the program with another format."""
 
     exit_code = 8
+
+
+class OlderFormatError(NewerFormatError):
+    """A record of a format that this version no longer reads."""

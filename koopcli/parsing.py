@@ -24,6 +24,13 @@ def parse_json(text: str | bytes) -> Any:
     return value
 
 
+def parse_json_at(text: str, place: int) -> Any:
+    """The value in the JSON ``text`` that begins at ``place``, whatever follows it. Raises as :func:`parse_json`."""
+    value, _ = _parsed(lambda whole: json.JSONDecoder().raw_decode(whole, place), text)
+    _check_depth([value])
+    return value
+
+
 def parse_toml(text: str) -> dict[str, Any]:
     """The document in the TOML ``text``, itself no level. Raises as :func:`parse_json`."""
     document: dict[str, Any] = _parsed(tomllib.loads, text)

@@ -10,7 +10,7 @@ import typer
 from koopcli.cli.invocation import open_store, print_json
 from koopcli.cli.options import JsonOption, StoreOption
 from koopcli.console import show_table
-from koopcli.errors import DamagedArtefactError, InvalidValueError, UsageError
+from koopcli.errors import DamagedArtefactError, InvalidValueError, NewerFormatError, UsageError
 
 DAYS = 7.0
 
@@ -31,7 +31,8 @@ def verify(
 ) -> None:
     """Check the artefacts of the store for damage. Without --repair nothing is changed.
 
-    Chunks of unfinished artefacts are checked when they are used.
+    Chunks of unfinished artefacts are checked when they are used. The exit code is 5 where something stays damaged, and
+    8 where every artefact is of a format that this koop does not read.
 
     Example: koop verify --repair
     """
@@ -54,7 +55,8 @@ def verify(
             for f in findings
         ]
         counts = {"unfinished": report.unfinished, "quarantine": report.quarantine, "damaged": len(left)}
-        print_json({"checked": report.checked, "bytes": report.read, **counts, "findings": rows})
+        checked = {"checked": report.checked, "other_format": report.other_format, "bytes": report.read}
+        print_json({**checked, **counts, "findings": rows})
     else:
         if findings:
             table = [[f.kind, f.name, f.path, f.what, "yes" if f.repaired else ""] for f in findings]
@@ -63,7 +65,8 @@ def verify(
         read = "sizes only" if fast else f"{size_text(report.read)} read"
         mended = sum(finding.repaired for finding in findings)
         state = f"{len(left)} damaged" if left else "nothing is damaged"
-        print(f"{report.checked} artefacts, {read}: {f'{mended} repaired, ' if mended else ''}{state}")
+        others = f"; {report.other_format} of another format" if report.other_format else ""
+        print(f"{report.checked} artefacts, {read}: {f'{mended} repaired, ' if mended else ''}{state}{others}")
         if report.unfinished or report.quarantine:
             console.note(f"unfinished artefacts: {report.unfinished}; files in quarantine: {report.quarantine}")
     if left:
@@ -72,6 +75,8 @@ def verify(
             if mend
             else f"{len(left)} damaged: koop verify --repair puts them aside and makes again what it can"
         )
+    if report.other_format and not report.checked:
+        raise NewerFormatError(f"none of the {report.other_format} artefacts has the format that this koop reads")
 
 
 def gc(

@@ -16,7 +16,7 @@ from koopcli.cli.invocation import brief, open_store, print_json, write_csv
 from koopcli.cli.lineage import show_lineage
 from koopcli.cli.options import JsonOption, StoreOption
 from koopcli.console import Console, show_line, show_table
-from koopcli.errors import NewerFormatError, UnknownNameError, UsageError
+from koopcli.errors import NewerFormatError, OlderFormatError, UnknownNameError, UsageError
 
 if TYPE_CHECKING:
     from koopcli.stages.base import Task
@@ -210,14 +210,21 @@ def unpin(
 
 
 def _records(shelf: Store, stage: str | None, console: Console) -> list[Record]:
-    """The records of the store, oldest first; those of a newer format are named and left out."""
+    """The records of the store, oldest first; those of another format are counted and left out."""
     records = []
+    newer = older = 0
     for made_by, key in shelf.index():
         if stage in (None, made_by):
             try:
                 records.append(shelf.record(made_by, key))
-            except NewerFormatError as error:
-                console.warn(str(error))
+            except OlderFormatError:
+                older += 1
+            except NewerFormatError:
+                newer += 1
+    if older:
+        console.warn(f"not listed: {older} of an older format; make them again by the same commands")
+    if newer:
+        console.warn(f"not listed: {newer} of a newer format; update koop")
     return sorted((r for r in records if r is not None), key=lambda r: (_time(r), r.stage, r.key))
 
 

@@ -7,6 +7,7 @@ import sys
 from contextlib import suppress
 from io import StringIO
 from pathlib import Path
+from stat import S_IMODE
 from typing import Annotated, Any, get_args
 
 import typer
@@ -85,7 +86,7 @@ def _write(path: Path, content: bytes) -> None:
         if _in_place(path):
             path.write_bytes(content)
             return
-        write_new(beside, content)
+        write_new(beside, content, S_IMODE(path.stat().st_mode) if path.exists() else None)
         os.replace(beside, path)
         with suppress(PermissionError):  # of a folder that can be written to but not read
             sync(path.parent)

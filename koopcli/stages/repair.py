@@ -29,6 +29,7 @@ from koopcli.store.records import whole_recipe
 from koopcli.store.survey import look, records
 from koopcli.store.verify import Finding
 
+DIGESTS = ("damaged digests", "missing digests")  # kinds of findings
 # Others, such as a full disk, concern more than one artefact.
 HOPELESS = (DamagedArtefactError, NewerFormatError, InvalidValueError, UnknownNameError, UsageError)
 
@@ -62,19 +63,24 @@ def _known(record: Record) -> bool:
 def repair(store: Store, reporter: Reporter, findings: Sequence[Finding]) -> list[Finding]:
     """Repair what can be; returns the findings, each saying whether it was.
 
+    Digests of the slabs of a large object whose bytes are right are written anew; otherwise it is made again.
     A damaged record whose recipe still hashes to its name is made again too. A damaged pin stays: without it, what it
     kept would look like something nobody wants.
     """
     lost = _put_aside(store, findings)
     pipeline = Pipeline(store, reporter)
     done = _make_lost(pipeline, lost)
-    again = ("damaged object", "missing object")
+    restored = {
+        finding for finding in findings if finding.kind in DIGESTS and store.restore_digests(Path(finding.path).stem)
+    }
+    again = ("damaged object", "missing object", *DIGESTS)
     done |= {
         finding.artefact
         for finding in findings
-        if finding.kind in again and finding.artefact and _make(pipeline, finding.artefact)
+        if finding.kind in again and finding not in restored and finding.artefact and _make(pipeline, finding.artefact)
     }
     mended = {finding for finding in findings if finding.artefact in done and finding.damage}
+    mended |= restored
     mended |= {finding for finding in findings if finding.kind == "damaged object" and not finding.artefact}
     return [replace(finding, repaired=finding in mended) for finding in findings]
 

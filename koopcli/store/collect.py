@@ -8,7 +8,6 @@ comes last finds the other's work.
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -20,10 +19,8 @@ from koopcli.store.digests import slabs_path
 from koopcli.store.files import DAY, HOUR, make_folder, own_name, storage_errors
 from koopcli.store.locks import if_free
 from koopcli.store.store import Store
-from koopcli.store.survey import DIGEST, PUT_ASIDE, File, Recorded, Stock, look, object_path, pinned, records, survey
+from koopcli.store.survey import PUT_ASIDE, File, Recorded, Stock, look, object_path, pinned, records, survey
 from koopcli.text import printable
-
-NAMES = re.compile(rf"(?<![0-9a-f]){DIGEST}(?![0-9a-f])".encode())
 
 
 @dataclass(frozen=True)
@@ -129,6 +126,10 @@ def _kept(stock: Stock, before: float) -> set[str]:
 def _closure(stock: Stock, waiting: Sequence[str]) -> set[str]:
     records = _recorded(stock)
     by_key = {recorded.key: full for full, recorded in records.items()}
+    by_data: dict[str, list[str]] = {}
+    for full, any_record in records.items():
+        if any_record.record is not None:
+            by_data.setdefault(any_record.record.data, []).append(full)
     closure: set[str] = set()
     left = list(waiting)
     while left:
@@ -138,26 +139,22 @@ def _closure(stock: Stock, waiting: Sequence[str]) -> set[str]:
             if recorded.record is not None:
                 left += recorded.record.lineage.values()
             else:
-                left += [by_key[key] for key in _named(recorded) if key in by_key]
+                left += [by_key[key] for key in recorded.named() if key in by_key]
+                if recorded.recipe is not None:  # cut off behind it, a record names its inputs in it alone
+                    left += [full for data in recorded.recipe["inputs"].values() for full in by_data.get(data, [])]
     return closure
 
 
 def _recorded(stock: Stock) -> dict[str, Recorded]:
-    """Every record, also those that were put aside and can be made again."""
-    return {**stock.lost, **stock.records}
-
-
-def _named(recorded: Recorded) -> set[str]:
-    """Every digest and key that a record names, in any format."""
-    if recorded.record is not None:
-        return {recorded.record.object}
-    return {text.decode() for text in NAMES.findall(recorded.text)}
+    """Every record, also those that were put aside; of two of one name, one whose recipe is whole."""
+    records = {**stock.lost, **stock.records}
+    return records | {full: lost for full, lost in stock.lost.items() if records[full].recipe is None}
 
 
 def _artefacts(store: Store, stock: Stock, kept: set[str], before: float) -> Iterator[Removal]:
     """Records that nobody keeps, each with its object once no other record names it; then objects without any."""
     recorded_by_name = _recorded(stock)
-    wanted = {digest for full in kept for digest in _named(recorded_by_name[full])}
+    wanted = {digest for full in kept for digest in recorded_by_name[full].named()}
     freed: set[str] = set()
     for full in sorted(stock.records.keys() - kept):
         recorded = stock.records[full]
@@ -168,8 +165,8 @@ def _artefacts(store: Store, stock: Stock, kept: set[str], before: float) -> Ite
         size = recorded.file.size + (file.size if file else 0)
         freed |= {digest} if file else set()
         yield Removal("artefact", recorded.record.name, size, (recorded.file,), (digest,) if file else (), full)
-    if any(recorded.record is None for recorded in stock.records.values()):
-        return  # what looks like an orphan may belong to a record that does not read here
+    if not stock.all_read():
+        return
     used = wanted | stock.named_by().keys()
     for digest, file in {**stock.slabs, **stock.objects}.items():
         if digest not in used and file.mtime < before:
@@ -280,7 +277,7 @@ def _settle(store: Store, away: Sequence[tuple[str, Path]]) -> None:
     """Put files of objects that were moved away back where a record names them, and remove the others."""
     if not away:
         return
-    named = {digest for recorded in records(store.root).values() for digest in _named(recorded)}
+    named = {digest for recorded in records(store.root).values() for digest in recorded.named()}
     for digest, aside in away:
         with suppress(FileNotFoundError):
             if digest in named:

@@ -40,12 +40,17 @@ def slabs_path(path: Path) -> Path:
     return path.with_suffix(".slabs")
 
 
+def digests_size(size: int) -> int:
+    """Bytes of the digests of the slabs of a large object of ``size`` bytes."""
+    return DIGEST * -(-size // SLAB)
+
+
 def read_digests(path: Path, name: str, size: int) -> bytes:
     """The digests of the slabs of the object ``name`` at ``path``, of ``size`` bytes.
 
     Raises ``UntrustedFileError``, and ``FileNotFoundError`` where there are none.
     """
-    wanted = DIGEST * -(-size // SLAB)
+    wanted = digests_size(size)
     with open_regular(slabs_path(path)) as (file, length):
         digests = file.read() if length == wanted else b""
     if len(digests) != wanted or hashlib.sha256(digests).hexdigest() != name:
@@ -63,8 +68,8 @@ class VerifiedFile(io.FileIO):
         super().__init__(descriptor)
         self._digests, self._size = digests, size
         self._verified = bytearray(len(digests) // DIGEST)
-        self.refuse: Callable[[], NoReturn] = _refuse
-        """What is done about a slab with other bytes."""
+        self.refuse: Callable[[VerifiedFile], NoReturn] = _refuse
+        """What is done about a slab with other bytes. It must not hold the file, which would stay open then."""
 
     def __del__(self) -> None:
         self.close()
@@ -91,7 +96,7 @@ class VerifiedFile(io.FileIO):
                 taken = len(part)
                 room[place - start : place - start + taken] = part
             if not taken:
-                self.refuse()
+                self.refuse(self)
             place += taken
         self.seek(stop)
         return stop - start
@@ -99,7 +104,7 @@ class VerifiedFile(io.FileIO):
     def _slab(self, number: int) -> bytes:
         content = os.pread(self.fileno(), SLAB, number * SLAB)
         if hashlib.sha256(content).digest() != self._digests[DIGEST * number : DIGEST * (number + 1)]:
-            self.refuse()
+            self.refuse(self)
         self._verified[number] = 1
         return content
 
@@ -109,5 +114,5 @@ class VerifiedFile(io.FileIO):
         return self._size if unverified < 0 else unverified * SLAB
 
 
-def _refuse() -> NoReturn:
+def _refuse(file: VerifiedFile) -> NoReturn:
     raise UntrustedFileError(WRONG)

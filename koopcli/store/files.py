@@ -128,10 +128,13 @@ def read_small(path: Path) -> bytes:
         return file.read(JSON_LIMIT)
 
 
-def write_new(path: Path, content: bytes) -> None:
-    """Write ``content`` to a new file, and sync it."""
+def write_new(path: Path, content: bytes, mode: int | None = None) -> None:
+    """Write ``content`` to a new file, and sync it. Its ``mode`` is the usual one unless given."""
     descriptor = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
     try:
+        if mode is not None:
+            with suppress(PermissionError):  # of a file system without modes
+                os.fchmod(descriptor, mode)
         write_at(descriptor, memoryview(content), 0)
         os.fsync(descriptor)
     finally:

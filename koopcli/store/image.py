@@ -21,7 +21,15 @@ from h5py import h5d, h5f, h5g, h5p
 from koopcli.errors import InvalidValueError
 from koopcli.parsing import TooDeepError, parse_json
 from koopcli.records import Array, Meta, Packed
-from koopcli.store.files import UntrustedFileError, open_regular, own_name, refuse_without_room, reserve, write_at
+from koopcli.store.files import (
+    UntrustedFileError,
+    open_regular,
+    own_name,
+    refuse_without_room,
+    reserve,
+    size_text,
+    write_at,
+)
 from koopcli.store.identity import canonical, plain, slabs
 from koopcli.store.superblock import SUPERBLOCK, mended, refuse_other_formats
 from koopcli.store.walk import LARGEST, refusals, refuse, text_beside, walk
@@ -46,6 +54,7 @@ def data_bytes(packed: Packed) -> int:
 
 def to_bytes(packed: Packed, labels: Labels = NO_LABELS) -> bytes:
     """The HDF5 image; the same record and ``labels`` give the same bytes."""
+    _refuse_large_facts(packed.meta)
     access = h5p.create(h5p.FILE_ACCESS)
     access.set_fapl_core(MEMORY_BLOCK, False)
     with _created(own_name(), access) as file:
@@ -60,6 +69,7 @@ def to_file(packed: Packed, path: Path, labels: Labels = NO_LABELS) -> None:
 
     The space is reserved before the first value, and the values are written to their places by plain system calls.
     """
+    _refuse_large_facts(packed.meta)
     refuse_without_room(path, data_bytes(packed))
     access = h5p.create(h5p.FILE_ACCESS)
     access.set_file_locking(False, True)
@@ -152,6 +162,16 @@ class _OnDisk:
     def __getitem__(self, index: Any, /) -> Any:
         with h5py.File(self.path, "r", locking=False) as file:
             return file[self.name][index]
+
+
+def _refuse_large_facts(meta: Meta) -> None:
+    """Raise ``InvalidValueError`` for facts that would be refused when they are read."""
+    size = len(json.dumps(plain(meta)))  # in ASCII
+    if size > META_LIMIT:
+        raise InvalidValueError(
+            f"the small facts of an artefact take {size_text(size)}, over {size_text(META_LIMIT)}: "
+            "ask for less in one artefact"
+        )
 
 
 def _created(name: str | Path, access: Any) -> h5py.File:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from koopcli.errors import InvalidValueError, NewerFormatError
-from koopcli.parsing import parse_json
+from koopcli.errors import InvalidValueError, NewerFormatError, OlderFormatError
+from koopcli.parsing import TooDeepError, parse_json, parse_json_at
 from koopcli.store.identity import SCHEMA, canonical, key_of
 from koopcli.store.names import DIGEST, SHORT, is_name
+
+RECIPE = re.compile(r'"recipe"\s*:\s*')
 
 
 class BadRecordError(Exception):
@@ -59,7 +62,8 @@ class Record:
     def from_json(cls, text: bytes, stage: str, key: str) -> Record:
         """The record in ``text``, verified.
 
-        Raises ``BadRecordError`` for a damaged record and ``NewerFormatError`` for one of another schema.
+        Raises ``BadRecordError`` for a damaged record and ``NewerFormatError`` for one of another schema, of which an
+        older one is an ``OlderFormatError``.
         """
         try:
             content = parse_json(text)
@@ -76,7 +80,7 @@ class Record:
             if check != _check(content):
                 raise BadRecordError
             if content.pop("schema") != SCHEMA:
-                raise NewerFormatError(
+                raise OlderFormatError(
                     f"{stage}/{key[:SHORT]} was written by an older koop (format {schema}, this one reads {SCHEMA}): "
                     "make it afresh in another --store, or read it by the koop that wrote it"
                 )
@@ -89,12 +93,25 @@ class Record:
 
 
 def whole_recipe(text: bytes, key: str) -> dict[str, Any] | None:
-    """The recipe in the text of a damaged record, if it still hashes to ``key``."""
+    """The recipe in the text of a damaged record, which may be cut off behind it, if it still hashes to ``key``."""
     try:
-        recipe = parse_json(text)["recipe"]
+        recipe = _recipe_in(text)
         return dict(recipe) if _is_recipe(recipe) and key_of(recipe) == key else None
     except (ValueError, KeyError, TypeError, InvalidValueError):
         return None
+
+
+def _recipe_in(text: bytes) -> Any:
+    try:
+        return parse_json(text)["recipe"]
+    except TooDeepError:
+        raise
+    except ValueError:
+        decoded = text.decode(errors="replace")  # it may be cut within a letter
+        heading = RECIPE.search(decoded)
+        if heading is None:
+            raise
+        return parse_json_at(decoded, heading.end())
 
 
 def _well_formed(record: Record) -> bool:

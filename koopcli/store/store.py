@@ -1,7 +1,7 @@
 """The store: objects by digest, records by key. The record is the commit point.
 
-objects/ab/<sha256>.h5   records/<stage>/<key>.json   partial/<key>/<i>-<sha256>-<code>.h5
-refs/ (pins)   locks/   tmp/   quarantine/
+objects/ab/<sha256>.h5, of large ones <sha256>.slabs beside it   records/<stage>/<key>.json
+partial/<key>/<i>-<sha256>-<code>.h5   refs/ (pins)   locks/   tmp/   quarantine/
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ import io
 import os
 import stat
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
+from functools import partial
 from itertools import count
 from pathlib import Path
 from types import MappingProxyType
@@ -247,6 +248,29 @@ class Store:
         aside = self._put_aside(path) if _identity(path) == (about.st_dev, about.st_ino) else "no longer"
         raise DamagedArtefactError(f"the object of {record.name} is damaged {aside}: {digests.WRONG}")
 
+    def restore_digests(self, digest: str) -> bool:
+        """See that the digests of the slabs of a large object are there, by reading it; ``False`` if it is damaged too.
+
+        Raises ``StorageError`` where they cannot be written.
+        """
+        path = self._object_path(digest)
+        beside = digests.slabs_path(path)
+        try:
+            with open_regular(path) as (file, size):
+                name, slabs = digests.named(file)
+        except (OSError, UntrustedFileError):
+            return False
+        if name != digest or not slabs:
+            return False
+        with suppress(OSError, UntrustedFileError):
+            if digests.read_digests(path, digest, size) == slabs:
+                return True
+        if os.path.lexists(beside):
+            self.put_aside(beside)
+        with storage_errors(self.root, len(slabs)):
+            self._publish(beside, slabs)
+        return True
+
     def put_aside(self, path: Path) -> None:
         """Move a damaged file to quarantine. Raises ``StorageError`` where that cannot be done."""
         done = self._put_aside(path)
@@ -299,5 +323,5 @@ def _verified(path: Path, record: Record, lost: Callable[[Record, io.FileIO], No
         large.verify()
     packed = image.from_open(large)
     if lost is not None:
-        large.refuse = lambda: lost(record, large)
+        large.refuse = partial(lost, record)
     return packed

@@ -7,8 +7,9 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, Literal
 
-from koopcli.errors import NewerFormatError
+from koopcli.errors import NewerFormatError, OlderFormatError
 from koopcli.parsing import parse_json
 from koopcli.progress import Progress, silent
 from koopcli.store.files import UntrustedFileError, read_small, reading_errors
@@ -21,6 +22,8 @@ WRITER = r"\d+-[0-9a-f]{16}@.+"  # the process that writes or removes a file
 RECORD = re.compile(rf"({DIGEST})\.json")
 OBJECT = re.compile(rf"({DIGEST})\.h5")
 PUT_ASIDE = re.compile(rf"({DIGEST})\.json(\.\d+)?")
+NAMES = re.compile(rf"(?<![0-9a-f]){DIGEST}(?![0-9a-f])".encode())
+STAGE_NAMED = re.compile(rb'"stage"\s*:\s*"([a-z0-9-]{1,64})"')
 SLABS = re.compile(rf"({DIGEST})\.slabs")
 REMOVING = re.compile(rf"({DIGEST})\.(?:h5|slabs)\.{WRITER}")
 FOLDERS = ("objects", "records", "partial", "refs", "locks", "tmp", "quarantine", "reports")
@@ -38,7 +41,7 @@ class File:
 
 @dataclass(frozen=True)
 class Recorded:
-    """A file among the records: its ``record``, or the ``text`` of one that is ``damaged`` or of a newer format."""
+    """A file among the records: its ``record``, or the ``text`` of one that is ``damaged`` or of another ``format``."""
 
     file: File
     stage: str
@@ -46,11 +49,21 @@ class Recorded:
     record: Record | None
     damaged: bool = False
     text: bytes = b""
+    format: Literal["", "newer", "older"] = ""
+    """Which format it has, where this koop does not read it."""
+    recipe: dict[str, Any] | None = None
+    """Of a damaged record: its recipe, if that is whole."""
 
     @property
     def full(self) -> str:
-        """The artefact's full name."""
-        return f"{self.stage}/{self.key}"
+        """The artefact's full name, or its key where the stage is unknown."""
+        return f"{self.stage}/{self.key}" if self.stage else self.key
+
+    def named(self) -> set[str]:
+        """The object that the record names; of one that does not read here, every digest and key in its text."""
+        if self.record is not None:
+            return {self.record.object}
+        return {text.decode() for text in NAMES.findall(self.text)}
 
 
 @dataclass
@@ -69,7 +82,7 @@ class Stock:
     temporary: list[File] = field(default_factory=list)
     quarantine: list[File] = field(default_factory=list)
     lost: dict[str, Recorded] = field(default_factory=dict)
-    """Damaged records in quarantine whose recipe is whole, as long as no good record has their name."""
+    """Damaged records in quarantine as long as no good record has their key, by name, or key where that is unknown."""
     foreign: list[File] = field(default_factory=list)
 
     def named_by(self) -> dict[str, list[Recorded]]:
@@ -79,6 +92,10 @@ class Stock:
             if recorded.record is not None:
                 users.setdefault(recorded.record.object, []).append(recorded)
         return users
+
+    def all_read(self) -> bool:
+        """Whether every record reads here. Otherwise what looks like an orphan may belong to one that does not."""
+        return all(recorded.record is not None for recorded in self.records.values())
 
     def newest(self) -> float:
         """The latest time of any object or record, 0 in an empty store."""
@@ -108,10 +125,7 @@ def survey(root: Path, progress: Progress = silent) -> Stock:
         ):
             for entry in _entries(root / name):
                 _add(files if re.fullmatch(pattern, entry.name, re.S) else stock.foreign, entry)
-        for recorded in filter(None, map(_put_aside, stock.quarantine)):
-            known = stock.records.get(recorded.full)
-            if known is None or known.damaged:
-                stock.lost[recorded.full] = recorded
+        stock.lost = _lost(stock)
     return stock
 
 
@@ -153,24 +167,38 @@ def look(path: Path, stage: str, key: str) -> Recorded | None:
     try:
         return Recorded(file, stage, key, Record.from_json(text, stage, key))
     except BadRecordError:
-        return Recorded(file, stage, key, None, True, text)
-    except NewerFormatError:
-        return Recorded(file, stage, key, None, False, text)
+        return Recorded(file, stage, key, None, True, text, recipe=whole_recipe(text, key))
+    except NewerFormatError as error:
+        return Recorded(
+            file, stage, key, None, False, text, "older" if isinstance(error, OlderFormatError) else "newer"
+        )
 
 
-def _put_aside(file: File) -> Recorded | None:
-    """The damaged record that a file in quarantine is, if its recipe is whole."""
-    match = PUT_ASIDE.fullmatch(file.path.name)
-    if match is None:
-        return None
+def _lost(stock: Stock) -> dict[str, Recorded]:
+    """The damaged records in quarantine whose key no good record has; of several, one whose recipe is whole."""
+    good = {recorded.key for recorded in stock.records.values() if not recorded.damaged}
+    by_key: dict[str, Recorded] = {}
+    for file in stock.quarantine:
+        match = PUT_ASIDE.fullmatch(file.path.name)
+        if match is not None and match[1] not in good:
+            recorded = _put_aside(file, match[1])
+            if recorded.recipe is not None or match[1] not in by_key:
+                by_key[match[1]] = recorded
+    return {recorded.full: recorded for recorded in by_key.values()}
+
+
+def _put_aside(file: File, key: str) -> Recorded:
+    """The damaged record of ``key`` that a file in quarantine is; its stage without a recipe is as its text has it."""
     try:
         text = read_small(file.path)
     except (OSError, UntrustedFileError):
-        return None
-    recipe = whole_recipe(text, match[1])
-    if recipe is None or not is_name(f"{recipe['stage']}/{match[1]}"):
-        return None
-    return Recorded(file, recipe["stage"], match[1], None, True, text)
+        text = b""
+    recipe = whole_recipe(text, key)
+    stage = STAGE_NAMED.search(text)
+    name = recipe["stage"] if recipe is not None else stage[1].decode() if stage else ""
+    if not is_name(f"{name}/{key}"):
+        return Recorded(file, "", key, None, True, text)
+    return Recorded(file, name, key, None, True, text, recipe=recipe)
 
 
 def pinned(root: Path, foreign: list[File] | None = None) -> dict[str, list[str] | None]:

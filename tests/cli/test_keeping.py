@@ -15,6 +15,8 @@ from filelock import FileLock
 
 from tests.cli.test_errors import one_line
 from tests.conftest import read_all
+from tests.large import large_from
+from tests.store.test_store import make_older
 
 DAY = 86400
 
@@ -77,7 +79,7 @@ def damage(kind: str, made, root: Path) -> None:
 
 
 DAMAGE = {
-    "damaged record": {"damaged record", "orphan object"},
+    "damaged record": {"damaged record"},
     "damaged object": {"damaged object"},
     "truncated object": {"damaged object"},
     "missing object": {"missing object"},
@@ -150,6 +152,42 @@ def test_records_that_a_command_put_aside_are_repaired(koop, folder, made):
     assert koop("verify").code == 0
     assert read_all(root) == 3
     assert len(list((root / "quarantine").iterdir())) == 3
+
+
+def test_records_that_are_cut_off_are_repaired_from_the_recipes_in_them(koop, folder, made):
+    root = folder / "artefacts"
+    for record, _ in made.values():
+        text = record.read_bytes()
+        record.write_bytes(text[: text.index(b'"lineage"')])
+    assert koop("verify", "--json").code == 5
+    assert koop("ls").err.count("put aside") == 3
+    told = koop("verify", "--json")
+    assert told.code == 5
+    assert [one["kind"] for one in findings(told) if one["damage"]] == ["record put aside"] * 3
+    assert json.loads(koop("verify", "--repair", "--json").out)["damaged"] == 0
+    assert koop("verify").code == 0
+    assert read_all(root) == 3
+
+
+@pytest.mark.parametrize("options", [[], ["--fast"]])
+def test_digests_of_slabs_are_written_anew_and_the_artefact_only_with_its_object(koop, folder, options):
+    with large_from(1000):
+        assert koop("fit-edmd").code == 0
+        made = files(folder)
+        slabs = {stage: content.with_suffix(".slabs") for stage, (_, content) in made.items()}
+        slabs["simulate"].unlink()
+        slabs["sample"].write_bytes(b"x")
+        flip(made["sample"][1])
+        assert koop("ls").out.count("missing") == 1
+        told = koop("verify", "--json", *options)
+        assert told.code == 5
+        kinds = {(one["kind"], one["path"].partition("/")[2]) for one in findings(told)}
+        assert {kind for kind, path in kinds if path.endswith(".slabs")} == {"missing digests", "damaged digests"}
+        mended = koop("verify", "--repair", *options)
+        assert mended.code == 0
+        assert "simulate" not in "".join(line for line in mended.err.splitlines() if "made in" in line)
+        assert koop("verify").code == 0
+        assert read_all(folder / "artefacts") == 3
 
 
 def test_a_repair_that_was_cut_off_goes_on(koop, made, monkeypatch):
@@ -229,7 +267,17 @@ def test_what_cannot_be_repaired_stays_in_the_list(koop, folder, made):
     record.write_text(record.read_text().replace('"order": 2', '"order": 3'))  # not even its recipe is known
     assert koop("verify", "--repair").code == 5
     assert not record.exists()
-    assert (folder / "artefacts" / "quarantine" / record.name).exists()
+    aside = folder / "artefacts" / "quarantine" / record.name
+    text = aside.read_bytes()
+    (lost,) = [one for one in findings(koop("verify", "--json")) if one["damage"]]
+    assert (lost["kind"], lost["name"]) == ("record put aside", f"fit-edmd/{record.stem[:12]}")
+    assert "run its command afresh" in lost["what"]
+    assert koop("verify", "--repair").code == 5
+    aside.unlink()
+    assert koop("verify").code == 0
+    aside.write_bytes(text)
+    assert koop("verify").code == 5
+    assert koop("fit-edmd").name == lost["name"]  # made again, it is no longer lost
     assert koop("verify").code == 0
 
 
@@ -252,6 +300,44 @@ def test_a_record_that_unpacks_no_more(koop, made, monkeypatch):
     assert made["fit-edmd"][1].exists()  # its bytes are right: who has the right code can read it
     monkeypatch.delitem(STAGES, "fit-edmd")
     assert [one["kind"] for one in findings(koop("verify", "--json"))] == ["newer format"]
+
+
+def test_a_store_of_the_format_before(koop, folder, made):
+    root = folder / "artefacts"
+    for record, _ in made.values():
+        make_older(record)
+    before = tree(root)
+    for options in ([], ["--fast"], ["--repair"]):
+        told = koop("verify", "--json", *options)
+        assert told.code == 8
+        assert [one["kind"] for one in findings(told)] == ["older format"] * 3
+        assert all("make it again by the same command" in one["what"] for one in findings(told))
+        assert not any(one["damage"] for one in findings(told))
+    shown = koop("verify")
+    assert shown.out.splitlines()[-1].endswith("read: nothing is damaged; 3 of another format")
+    assert "none of the 3 artefacts has the format" in shown.err.splitlines()[-1]
+    listed = koop("ls")
+    assert listed.code == 0
+    assert [line for line in listed.err.splitlines() if "format" in line] == [
+        "warning: not listed: 3 of an older format; make them again by the same commands"
+    ]
+    one_line(koop("show", f"sample/{made['sample'][0].stem}"), 8, "written by an older koop")
+    assert tree(root) == before
+    (root / "objects" / "aa").mkdir(exist_ok=True)
+    (root / "objects" / "aa" / f"{'a' * 64}.slabs").write_bytes(b"")
+    assert {one["kind"] for one in findings(koop("verify", "--json"))} == {"older format"}
+    made["sample"][0].write_text("{")  # damage comes first
+    assert koop("verify").code == 5
+
+
+def test_records_of_the_format_before_beside_others(koop, made):
+    make_older(made["fit-edmd"][0])
+    told = koop("verify", "--json")
+    assert told.code == 0
+    assert json.loads(told.out)["checked"] == 2
+    assert json.loads(told.out)["other_format"] == 1
+    assert [one["kind"] for one in findings(told)] == ["older format"]
+    assert koop("ls").err.count("format") == 1
 
 
 def test_a_kind_that_this_koop_lacks_is_no_damage(koop, folder, made):
@@ -292,7 +378,6 @@ def test_what_is_no_damage_is_told_and_left_alone(koop, folder, made):
     assert result.code == 0
     assert {(one["kind"], one["path"]) for one in findings(result)} == {
         ("newer format", str(newer.relative_to(root))),
-        ("orphan object", next(one["path"] for one in findings(result) if one["kind"] == "orphan object")),
         ("foreign file", "objects/notes.txt"),
         ("foreign file", "stray"),
         ("foreign file", f"records/sample/{'0' * 64}.json"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from stat import S_IMODE
+
 from koopcli.cli.outputs import write_outputs
 from koopcli.console import Console
 from tests.cli.test_errors import one_line
@@ -37,3 +39,16 @@ def test_a_power_cut_leaves_the_users_file_as_it_was_or_whole(tmp_path):
     kept = [{state.tree["map.png"] for state in states(start, done[:cut])} for cut in range(len(done) + 1)]
     assert set().union(*kept) == {b"what was there", b"what is new"}
     assert kept[-1] == {b"what is new"}
+
+
+def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path):
+    path, new = tmp_path / "table.csv", tmp_path / "new.csv"
+    path.write_text("what was here")
+    usual = path.stat().st_mode
+    for mode in (0o600, 0o664, 0o640):
+        path.chmod(mode)
+        write_outputs(Console(), b"what is new", path, None, None)
+        assert path.read_bytes() == b"what is new"
+        assert S_IMODE(path.stat().st_mode) == mode
+    write_outputs(Console(), b"what is new", new, None, None)
+    assert new.stat().st_mode == usual

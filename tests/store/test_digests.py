@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import io
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from koopcli.console import Console
 from koopcli.errors import DamagedArtefactError
 from koopcli.records import Array, Packed
+from koopcli.stages.repair import repair
 from koopcli.store import Store, collect, digests, image
 from koopcli.store.collect import plan, remove
 from koopcli.store.files import DAY
@@ -97,9 +101,75 @@ def test_the_digests_are_guarded(store, record, change):
 def test_without_its_digests_an_object_is_missing(store, record):
     digests.slabs_path(store.path(record)).unlink()
     assert not store.has_object(record)
-    assert [finding.kind for finding in verify(store, lambda *_: None).findings] == ["missing object"]
+    assert [finding.kind for finding in verify(store, lambda *_: None).findings] == ["missing digests"]
     with pytest.raises(DamagedArtefactError, match="missing"):
         store.read(record)
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="the system lists no descriptors")
+def test_a_large_object_that_was_read_is_closed_at_once(store, record):
+    gc.collect()
+    gc.disable()
+    try:
+        open_before = len(os.listdir("/proc/self/fd"))
+        for _ in range(20):
+            assert len(store.read(record).arrays) == 3
+        assert len(os.listdir("/proc/self/fd")) <= open_before
+    finally:
+        gc.enable()
+
+
+def lose(path):
+    path.unlink()
+
+
+def cut(path):
+    path.write_bytes(path.read_bytes()[:-1])
+
+
+def change(path):
+    content = bytearray(path.read_bytes())
+    content[7] ^= 1
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("harm", [lose, cut, change])
+def test_digests_that_are_wrong_are_found_and_written_anew(store, record, harm):
+    path = store.path(record)
+    beside = digests.slabs_path(path)
+    good, before = beside.read_bytes(), path.stat()
+    harm(beside)
+    for opens in (None, lambda *_: None):
+        if opens is None and harm is change:
+            continue
+        report = verify(store, opens)
+        (finding,) = report.findings
+        assert finding.kind == ("missing digests" if harm is lose else "damaged digests")
+        assert (finding.path, finding.artefact) == (str(beside.relative_to(store.root)), f"sample/{record.key}")
+        assert finding.damage
+    (mended,) = repair(store, Console(), report.findings)
+    assert mended.repaired
+    assert beside.read_bytes() == good
+    assert path.stat() == before
+    assert verify(store, lambda *_: None).findings == ()
+    assert (store.root / "quarantine").exists() == (harm is not lose)
+    assert store.restore_digests(record.object)
+    assert image.loaded(store.read(record)) == packed()
+
+
+@pytest.mark.parametrize("harm", [lose, cut, change])
+def test_digests_are_not_taken_from_a_damaged_object(store, record, harm):
+    path = store.path(record)
+    harm(digests.slabs_path(path))
+    change(path)
+    kinds = [finding.kind for finding in verify(store, lambda *_: None).findings]
+    assert kinds == ["missing digests" if harm is lose else "damaged digests", "damaged object"]
+    assert not store.restore_digests(record.object)
+    cut(path)
+    assert verify(store, None).findings[-1].kind == "damaged object"
+    path.unlink()
+    assert [finding.kind for finding in verify(store, None).findings] == ["missing object"]
+    assert not store.restore_digests(record.object)
 
 
 def test_what_others_have_put_right_is_not_put_aside(store, record):

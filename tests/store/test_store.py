@@ -24,6 +24,7 @@ from koopcli.store.files import make_folder, publish, size_text, sweep
 from koopcli.store.identity import SCHEMA
 from koopcli.store.names import store_root
 from koopcli.store.pins import pin, pins, unpin
+from koopcli.store.records import _check
 from tests.large import large_from
 
 
@@ -97,6 +98,19 @@ def test_large_content_goes_through_a_file(store, large):
             image.loaded(store.read(record))
 
 
+@pytest.mark.parametrize("limit", [image.IMAGE_LIMIT, 8], ids=["in memory", "by a file"])
+def test_facts_that_could_not_be_read_are_refused_before_they_are_written(store, monkeypatch, limit):
+    monkeypatch.setattr(image, "IMAGE_LIMIT", limit)
+    monkeypatch.setattr(image, "META_LIMIT", 2000)
+    room = 2000 - len('{"text": ""}')
+    whole = Packed(packed().arrays, {"text": "x" * room})
+    assert store.read(store.commit(recipe(), {}, whole, {})).meta == whole.meta
+    before = set(store.root.rglob("*"))
+    with pytest.raises(InvalidValueError, match=r"take 2\.0 kB, over 2\.0 kB"):
+        store.commit(recipe(1), {}, Packed(packed().arrays, {"text": "x" * (room + 1)}), {})
+    assert set(store.root.rglob("*")) == before
+
+
 @pytest.mark.parametrize("limit", [image.IMAGE_LIMIT, 100], ids=["in memory", "by a file"])
 @pytest.mark.parametrize("shape", [(400,), (70, 5), (3, 4, 50)])
 def test_every_value_comes_back_from_many_slabs(store, monkeypatch, limit, shape):
@@ -167,14 +181,17 @@ def test_a_newer_record_is_left_alone(store):
     assert path.exists()
 
 
-def test_a_record_of_an_older_format_is_named_and_left_alone(store):
-    from koopcli.store.records import _check
-
-    record = commit(store)
-    path = store.root / "records" / "sample" / f"{record.key}.json"
+def make_older(path):
+    """Give the record at ``path`` the format before."""
     old = {**json.loads(path.read_text()), "schema": SCHEMA - 1}
     del old["check"]
     path.write_text(json.dumps({**old, "check": _check(old)}))
+
+
+def test_a_record_of_an_older_format_is_named_and_left_alone(store):
+    record = commit(store)
+    path = store.root / "records" / "sample" / f"{record.key}.json"
+    make_older(path)
     before = path.read_bytes()
     with pytest.raises(NewerFormatError, match=r"written by an older koop .* make it afresh in another --store"):
         store.record("sample", record.key)

@@ -13,6 +13,7 @@ from koopcli.errors import StorageError
 from koopcli.store import Store
 from koopcli.store import store as store_module
 from koopcli.store.identity import key_of
+from koopcli.store.records import whole_recipe
 from koopcli.store.survey import survey
 from koopcli.store.verify import verify
 from tests.store.test_store import commit
@@ -123,11 +124,11 @@ def test_a_record_that_is_a_link_or_nonsense(store, tmp_path):
     path = store.root / "records" / "sample" / f"{record.key}.json"
     path.rename(tmp_path / "elsewhere")
     path.symlink_to(tmp_path / "elsewhere")
-    assert kinds(verify(store, look)) == ["damaged record", "orphan object"]
+    assert kinds(verify(store, look)) == ["damaged record"]
     path.unlink()
     for text in ("", "[]", "{" * 100_000, "[" * 100_000, json.dumps({"schema": "x"})):
         path.write_text(text)
-        assert kinds(verify(store, look)) == ["damaged record", "orphan object"]
+        assert kinds(verify(store, look)) == ["damaged record"]
     assert not (store.root / "quarantine").exists()
 
 
@@ -140,11 +141,11 @@ def test_a_record_that_was_put_aside_is_lost_until_another_has_its_name(store):
         assert store.record("sample", record.key) is None
     names = {f"{record.key}.json", f"{record.key}.json.1", f"{record.key}.json.2"}
     assert {aside.name for aside in (store.root / "quarantine").iterdir()} == names
-    lost, orphan = verify(store, look).findings
+    (lost,) = verify(store, look).findings
     assert (lost.kind, lost.artefact, lost.damage) == ("record put aside", f"sample/{record.key}", True)
-    assert orphan.kind == "orphan object"
+    assert "--repair makes it again" in lost.what
     path.write_text("{")
-    assert kinds(verify(store, look)) == ["damaged record", "record put aside", "orphan object"]
+    assert kinds(verify(store, look)) == ["damaged record", "record put aside"]
     path.write_text(good)
     assert verify(store, look).findings == ()
     path.unlink()
@@ -163,15 +164,55 @@ def test_a_record_that_was_put_aside_is_lost_until_another_has_its_name(store):
         '{"recipe": {"stage": "../x", "version": 1, "settings": {}, "inputs": {}}}',
     ],
 )
-def test_what_else_lies_in_quarantine_is_no_recipe(store, text):
+def test_a_record_in_quarantine_without_a_recipe_is_lost_until_its_file_is_gone(store, text):
     recipe = json.loads(text or "{}")
     key = key_of(recipe["recipe"]) if "recipe" in recipe else "0" * 64
-    (store.root / "quarantine").mkdir(parents=True)
-    (store.root / "quarantine" / f"{key}.json").write_text(text)
-    os.mkfifo(store.root / "quarantine" / f"{'1' * 64}.json")
+    quarantine = store.root / "quarantine"
+    quarantine.mkdir(parents=True)
+    (quarantine / f"{key}.json").write_text(text)
+    os.mkfifo(quarantine / f"{'1' * 64}.json")
+    (quarantine / f"{'2' * 64}.h5").write_text("")
+    (quarantine / f"{key}.json.given-up").write_text("")
     report = verify(store, look)
-    assert report.quarantine == 2
-    assert report.findings == ()
+    assert report.quarantine == 4
+    assert {(one.kind, one.path, one.damage) for one in report.findings} == {
+        ("record put aside", f"quarantine/{name}.json", True) for name in (key, "1" * 64)
+    }
+    for finding in report.findings:
+        assert "run its command afresh; remove the file" in finding.what
+        (store.root / finding.path).unlink()
+    assert verify(store, look).findings == ()
+
+
+@pytest.mark.parametrize("keep", [0, 30, 400])
+def test_a_record_that_was_put_aside_cut_off(store, keep):
+    """As long as its recipe is whole it can be made again; otherwise it is lost until it is made by its command."""
+    record = commit(store)
+    path = store.root / "records" / "sample" / f"{record.key}.json"
+    path.write_bytes(path.read_bytes()[:keep])
+    assert store.record("sample", record.key) is None
+    assert not path.exists()
+    (finding,) = [one for one in verify(store, look).findings if one.damage]
+    assert finding.kind == "record put aside"
+    assert finding.artefact == (f"sample/{record.key}" if keep == 400 else "")
+    assert ("is whole" in finding.what) == (keep == 400)
+    commit(store)
+    assert verify(store, look).findings == ()
+
+
+@pytest.mark.parametrize("text", ['{"recipe": ', "{'recipe': {", '{"recipe": ' + "[" * 100_000, '"recipe": {"stage"'])
+def test_texts_that_are_cut_off_within_a_recipe(text):
+    assert whole_recipe(text.encode(), "0" * 64) is None
+
+
+def test_a_recipe_is_read_from_a_text_that_is_cut_off_anywhere_behind_it(store):
+    record = commit(store)
+    path = store.root / "records" / "sample" / f"{record.key}.json"
+    text = path.read_bytes().replace(b"2026", "\u2026".encode())
+    behind = text.index(b'"lineage"') - 3
+    assert {whole_recipe(text[:end], record.key) is not None for end in range(behind, len(text))} == {True}
+    assert {whole_recipe(text[:end], record.key) is not None for end in range(behind)} == {False}
+    assert whole_recipe(text[:behind].replace(b"width", b"Width"), record.key) is None
 
 
 def test_the_survey_of_nothing(tmp_path):
