@@ -10,6 +10,7 @@ import json
 import re
 import sys
 from dataclasses import MISSING, fields, is_dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -276,6 +277,8 @@ def _chunks(stage, settings, inputs):
     return chunks
 
 
+_scored = partial(Evaluate, relift=True)
+
 TOYS = {
     "sample": [
         (GridSample(seed=3, count=4, columns=2), {}),
@@ -375,16 +378,25 @@ TOYS = {
         (Baseline(kind="linearisation"), {"trajectories": _trajectories(1)}),
     ],
     "evaluate": [
-        (Evaluate(chunk=100, first=1, relift=True), {"predictor": _predictor(), "trajectories": _trajectories(4)}),
-        (Evaluate(chunk=100, first=1, relift=True), {"predictor": _predictor(growth=250.0), "trajectories": _trajectories(4)}),
-        (Evaluate(chunk=100, first=0, relift=True), {"predictor": _looked_up(), "trajectories": _calm()}),
-        (Evaluate(chunk=100, first=1, relift=True), {"predictor": _bilinear(), "trajectories": _trajectories(4)}),
+        (_scored(chunk=100, first=1), {"predictor": _predictor(), "trajectories": _trajectories(4)}),
+        (
+            _scored(chunk=100, first=1),
+            {"predictor": _predictor(growth=250.0), "trajectories": _trajectories(4)},
+        ),
+        (_scored(chunk=100, first=0), {"predictor": _looked_up(), "trajectories": _calm()}),
+        (_scored(chunk=100, first=1), {"predictor": _bilinear(), "trajectories": _trajectories(4)}),
         *(
-            (Evaluate(chunk=100, first=0, relift=True), {"predictor": _forecast(kind), "trajectories": _calm()})
+            (_scored(chunk=100, first=0), {"predictor": _forecast(kind), "trajectories": _calm()})
             for kind in ("hold", "rotation", "linearisation")
         ),
-        (Evaluate(chunk=2, first=1, restart=3, relift=True), {"predictor": _bilinear(), "trajectories": _trajectories(4)}),
-        (Evaluate(chunk=100, first=0, relift=True), {"predictor": _forecast("linearisation"), "trajectories": _steered()}),
+        (
+            _scored(chunk=2, first=1, restart=3),
+            {"predictor": _bilinear(), "trajectories": _trajectories(4)},
+        ),
+        (
+            _scored(chunk=100, first=0),
+            {"predictor": _forecast("linearisation"), "trajectories": _steered()},
+        ),
     ],
     "sweep": [
         (

@@ -68,6 +68,7 @@ class FitEigen(Settings):
         """Distances are in the largest magnitude of each state of ``x`` (J, samples, n_x); those of the nearest sample
         alone in raw units (7.6).
         """
+        self.check_scale(x.shape[2])
         size = np.abs(x).max(axis=(0, 1))
         raw = isinstance(self.lift, NearestLift) and self.radial_power == 1.0
         scale = np.ones(x.shape[2]) if raw else np.where(size > 0, size, 1.0)

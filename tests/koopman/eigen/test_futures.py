@@ -26,10 +26,17 @@ from tests.conftest import ball_of, eigen_fit, trajectories_of
 AHEAD = {"window": "horizon", "kind": "comb", "pairs": 6, "cut": 1e-10}
 
 
+F = np.array([[-1.0, 4.0, 0.3], [-4.0, -1.0, 0.0], [0.0, 0.5, -2.0]])
+
+
+def spread_of(trajectories):
+    """Forty states between those of the trajectories."""
+    return np.asarray(trajectories.x)[:40, :30].mean(axis=1)
+
+
 @pytest.fixture(scope="module")
 def linear():
     """Trajectories of a linear system in three dimensions."""
-    F = np.array([[-1.0, 4.0, 0.3], [-4.0, -1.0, 0.0], [0.0, 0.5, -2.0]])
     x0 = sampling.ball(0, 120)
     step = expm(F * 0.01).T
     x = np.empty((120, 81, 3))
@@ -258,3 +265,68 @@ def test_held_back_states_are_predicted_without_their_own_trajectory(rolling):
         np.stack([x[j, k : k + 31] for j, k in zip(chosen // 51, chosen % 51, strict=True)]),
     )
     assert np.median(predictor.trust.errors) > 5 * np.median(own)
+
+
+# --- composed lookups
+
+
+COMPOSED = {**AHEAD, "lift": "polyharmonic", "neighbours": 30, "horizon": 20, "tabulated": 80}
+
+
+def test_one_lookup_of_the_whole_horizon_is_no_composition(linear):
+    once, composed = (eigen_fit(linear, **{**COMPOSED, **how}) for how in ({"tabulated": 60}, {"lookup_steps": 20}))
+    x = spread_of(linear)
+    same = replace(composed.observables, lookup_steps=None)
+    assert composed.observables.future(x) == pytest.approx(same.future(x), abs=0)
+    assert once.observables.lookup_steps is None
+
+
+@pytest.mark.parametrize("steps", [1, 7, 10])
+def test_composed_lookups_are_exact_for_a_linear_system(linear, steps):
+    """Splines meet every linear function, so that each lookup is exact and with it what follows; 7 leaves a rest."""
+    lift = eigen_fit(linear, **COMPOSED, spacing=8, lookup_steps=steps).observables
+    x = spread_of(linear)
+    truth = np.stack([x @ np.linalg.matrix_power(expm(F * 0.01).T, k) for k in range(21)], axis=1)
+    assert lift.future(x) == pytest.approx(truth, abs=1e-7)
+    assert len(lift.nodes.kept) == 120 * (81 - steps)
+
+
+def test_composed_lookups_are_lookups_one_after_another(rolling):
+    """In the world: turned back by the heading of every state that is reached."""
+    lift = eigen_fit(rolling[0], **COMPOSED, lookup_steps=5, coordinates="world", scale=(1, 0.4, 0.3)).observables
+    x = np.asarray(rolling[1].x[:50, 0])
+    short = replace(lift, projection=lift.projection[:, :6])
+    at = x
+    for k in range(0, 20, 5):
+        assert lift.future(x)[:, k] == pytest.approx(at, rel=1e-9, abs=1e-12)
+        at = short.future(at)[:, 5]
+
+
+def test_composed_lookups_miss_less(rolling):
+    training, test = rolling
+    x = np.asarray(test.x)[:, :21]
+    errors = []
+    for how in ({"tabulated": 60}, {"lookup_steps": 5, "radial_power": 0.2, "scale": (1, 0.4, 0.3)}):
+        fit = eigen_fit(training, **{**COMPOSED, **how}, coordinates="world")
+        errors.append(rmse(fit.predict(x[:, 0], steps=20), x).mean())
+    assert errors[1] < errors[0] / 2
+
+
+def test_a_composed_lift_is_stored_and_read(rolling):
+    fit = eigen_fit(rolling[0], **COMPOSED, lookup_steps=5)
+    again = stored.predictor(fit.pack())
+    x = np.asarray(rolling[1].x[:9, 0])
+    assert (again.observables.lift(x) == fit.observables.lift(x)).all()
+    assert "lookup_steps" not in str(eigen_fit(rolling[0], **{**COMPOSED, "tabulated": 60}).pack().meta)
+
+
+@pytest.mark.parametrize(
+    ("how", "text"),
+    [
+        ({"lookup_steps": 81}, "'fit-eigen.lookup_steps' of 81 is longer than trajectories of 80 steps"),
+        ({"scale": (1.0, 2.0), "lookup_steps": 5}, "'fit-eigen.scale' has 2 numbers for 3 states"),
+    ],
+)
+def test_what_does_not_go_with_the_data_is_refused(linear, how, text):
+    with pytest.raises(InvalidValueError, match=text):
+        eigen_fit(linear, **COMPOSED, **how)
