@@ -28,7 +28,7 @@ def test_from_nothing_to_a_predictor_that_knows_its_errors(koop, folder):
     assert predictor["functions"] == 66
     assert predictor["horizon"] == 50
     assert predictor["modes"] == 22
-    assert predictor["nodes"] == 2 * 25 * 101
+    assert predictor["nodes"] == 2 * 25 * (101 - 5)
     assert predictor["missed"] < 0.2
     assert predictor["trust"]["level"] == 0.9
     assert "an eigenfunction has several values" in made.err
@@ -81,6 +81,7 @@ def test_the_relifted_score_can_be_left_out(koop):
 
 
 BEST = ("--experiment", "best-eigen")
+QUICK = ("--experiment", "quick-eigen")
 
 
 @pytest.mark.parametrize(
@@ -96,7 +97,12 @@ BEST = ("--experiment", "best-eigen")
         (["fit-eigen", *BEST, "--mirror", "sideways"], 2, "choose one of left-right, front-rear"),
         (["fit-eigen", *BEST, "--mirror", "front-rear", "--vehicle", "efremov-2020"], 3, "no front-rear symmetry"),
         (["fit-eigen", *BEST, "--set", "fit-eigen.horizon=1.5"], 3, "'fit-eigen.horizon' of 1.5 s is longer"),
-        (["fit-eigen", *BEST, "--set", "fit-eigen.rounds=0"], 3, "'fit-eigen.tabulate' of 1 s leaves nothing"),
+        (["fit-eigen", *QUICK, "--set", "fit-eigen.rounds=0"], 3, "'fit-eigen.tabulate' of 1 s leaves nothing"),
+        (["fit-eigen", *QUICK, "--lookup-steps", "5"], 3, "a short lookup needs no continuation"),
+        (["fit-eigen", *BEST, "--lookup-steps", "0"], 3, "'fit-eigen.lookup_steps' must be"),
+        (["fit-eigen", *BEST, "--lookup-steps", "101"], 3, "of 101 is longer than trajectories of 100 steps"),
+        (["fit-eigen", *BEST, "--set", "fit-eigen.scale=[1,2]"], 3, "has 2 numbers for 3 states"),
+        (["fit-eigen", "--lookup-steps", "5"], 2, "'fit-eigen.lookup_steps' belongs to window 'horizon'"),
         (["fit-eigen", "--window", "horizon", "--set", "fit-eigen.rounds=1"], 3, "set fit-eigen.horizon too"),
         (["fit-eigen", "--window", "horizon", "--set", "fit-eigen.horizon=1"], 3, "do not hold the horizon of 1 s"),
         (["fit-eigen", "--coordinates", "world"], 2, "'fit-eigen.coordinates' belongs to window 'horizon'"),
@@ -124,7 +130,7 @@ def test_bad_input(koop, args, code, says):
 @pytest.mark.parametrize(
     ("sets", "says"),
     [
-        (["fit-eigen.nodes=1"], "'polyharmonic' needs 60 nodes and the data have"),
+        (["fit-eigen.nodes=1"], "'polyharmonic' needs 40 nodes and the data have"),
         (["fit-eigen.neighbours=5"], "'fit-eigen.neighbours' must be at least 10"),
         (["fit-eigen.lift=linear", "fit-eigen.nodes=1", "sample.budget=1"], "'linear' needs 4 nodes"),
     ],
