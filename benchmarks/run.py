@@ -47,6 +47,20 @@ def row(what: str, figure: str, aim: str) -> None:
     print(f"| {what} | {figure} | {aim} |", flush=True)
 
 
+def lifts(work: Path) -> None:
+    """How long a lift takes, beside a product of two matrices of 2 000 × 2 000."""
+    for name in ("best-eigen", "quick-eigen"):
+        made = work / name
+        fit = [*KOOP, "fit-eigen", "--experiment", name, "--store", str(made)]
+        subprocess.run(fit, check=True, capture_output=True)
+        one, many, product = (
+            medians([task(what, made) for _ in range(RUNS)])["cpu"] for what in ("lift-one", "lift-many", "dgemm")
+        )
+        figure = f"{1e3 * one / 200:.2f} = dgemm / {200 * product / one:.0f}"
+        row(f"{name}, a lift of one state: CPU ms, and beside 2 000³ dgemm", figure, "")
+        row(f"{name}, a lift of 2 000 states: CPU s, and beside it", f"{many:.2f} = dgemm × {many / product:.1f}", "")
+
+
 def main() -> None:
     work = Path(tempfile.mkdtemp(prefix="koop-bench-"))
     store = work / "store"
@@ -110,6 +124,7 @@ def main() -> None:
         assert abs(quick["result"] / slowly["result"] - 1) < close, f"{fast} and {slow} disagree"
         row(what, f"{quick['cpu']:.2f} / {slowly['cpu']:.2f} = 1 / {slowly['cpu'] / quick['cpu']:.0f}", "")
 
+    lifts(work)
     best = [*KOOP, "evaluate", "--experiment", "best-eigen", "--store", str(work / "best")]
     clock = time.perf_counter()
     fit = subprocess.run(

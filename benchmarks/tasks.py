@@ -233,7 +233,41 @@ def rbf(store: Path):
     yield float(found.sum())
 
 
+def lift_one(store: Path):
+    """200 states, one after another, as a controller would ask."""
+    lift, x = _lift_and_states(store)
+    yield
+    yield sum(float(lift(x[i : i + 1]).sum()) for i in range(200))
+
+
+def lift_many(store: Path):
+    """2 000 states at once."""
+    lift, x = _lift_and_states(store)
+    yield
+    yield float(lift(x).sum())
+
+
+def _lift_and_states(store: Path):
+    """The lift of the predictor in the ``store``, and states between its data."""
+    lift = koopcli.load("fit-eigen", store).observables
+    states = lift.nodes.states
+    x = (states[:2000] + states[5:2005]) / 2
+    lift.lift(x[:1])
+    return lift.lift, x
+
+
+def dgemm(store: Path):
+    """The product of two matrices of 2 000 × 2 000."""
+    a = np.random.default_rng(0).normal(size=(2000, 2000))
+    a[:10] @ a
+    yield
+    yield float((a @ a).sum())
+
+
 TASKS = {
+    "lift-one": lift_one,
+    "lift-many": lift_many,
+    "dgemm": dgemm,
     "fit-product": fit_product,
     "fit-blocks": fit_blocks,
     "fit-plain": fit_plain,

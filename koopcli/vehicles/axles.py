@@ -53,6 +53,11 @@ class Axles:
         return tyre.stacked(*tyres_of(self.parameters, "longitudinal"))
 
     @cached_property
+    def _shifted(self) -> bool:
+        """Whether a tyre pulls to one side at no slip angle."""
+        return bool(self.lateral.S_h.any())
+
+    @cached_property
     def grip(self) -> FloatArray:
         """Largest force in N of one wheel of each axle in any direction, (2,)."""
         return np.asarray(self.parameters.mu_scale * np.maximum(self.lateral.mu, self.longitudinal.mu) * self.loads)
@@ -60,14 +65,14 @@ class Axles:
     def velocities(self, x: FloatArray, steer: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Velocities in m/s at the axles in the frame of their wheels, along and across, (..., 2) each."""
         v_x, v_y = x[..., :1], x[..., 1:2] + self.arms * x[..., 2:3]
-        if not np.any(steer):
+        if not steer.any():
             return v_x, v_y
         return np.cos(steer) * v_x + np.sin(steer) * v_y, np.cos(steer) * v_y - np.sin(steer) * v_x
 
     def forces(self, slip_angle: FloatArray, slip_ratio: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Forces in N of both wheels of each axle together in the frame of the wheels, along and across, (6.3)."""
         both = 2 * self.parameters.mu_scale
-        if not np.any(self.lateral.S_h):
+        if not self._shifted:
             F_x, F_y = self._left(slip_angle, slip_ratio)
             return both * F_x, both * F_y
         F_x, F_y = self._left(slip_angle, slip_ratio)
@@ -76,7 +81,7 @@ class Axles:
 
     def turned(self, F_x: FloatArray, F_y: FloatArray, steer: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Forces in the frame of wheels at ``steer`` in rad as body-fixed ones, (6.4)."""
-        if not np.any(steer):
+        if not steer.any():
             return F_x, F_y
         return np.cos(steer) * F_x - np.sin(steer) * F_y, np.sin(steer) * F_x + np.cos(steer) * F_y
 
@@ -103,7 +108,7 @@ class Axles:
     def _left(self, slip_angle: FloatArray, slip_ratio: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Forces of the left wheel of each axle on a road of grip one."""
         F_y = tyre.force(self.lateral, slip_angle, self.loads)
-        if not np.any(slip_ratio):
+        if not slip_ratio.any():
             return slip_ratio, F_y
         F_x = tyre.force(self.longitudinal, slip_ratio, self.loads)
         if self.combined == "none":

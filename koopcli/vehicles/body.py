@@ -33,4 +33,7 @@ def derivative(p: VehicleParameters, x: FloatArray, F_x: FloatArray, F_y: FloatA
 
 def like(x: FloatArray, u: FloatArray) -> FloatArray:
     """An array for the derivative of ``x`` under ``u``."""
-    return np.empty((*np.broadcast_shapes(x.shape[:-1], u.shape[:-1]), x.shape[-1]))
+    rows = x.shape[:-1]
+    if u.shape[:-1] != rows:
+        rows = np.broadcast_shapes(rows, u.shape[:-1])
+    return np.empty((*rows, x.shape[-1]))
