@@ -130,7 +130,7 @@ class Ahead(Window):
 
     def name(self, how: FitEigen) -> str:
         """What a predictor with it is called."""
-        return f"eigenfunctions, {how.lift.kind}"
+        return f"eigenfunctions, {how.lift.kind if self.lookup_steps is None else 'composed lookups'}"
 
     def horizon_steps(self, how: FitEigen, steps: int, dt: float) -> int:
         """The longest prediction."""
