@@ -248,10 +248,11 @@ def lift_many(store: Path):
 
 
 def _lift_and_states(store: Path):
-    """The lift of the predictor in the ``store``, and states between its data."""
+    """The lift of the predictor in the ``store``, and states drawn as those of a test set are."""
+    from koopcli.simulation import sampling
+
     lift = koopcli.load("fit-eigen", store).observables
-    states = lift.nodes.states
-    x = (states[:2000] + states[5:2005]) / 2
+    x = sampling.ball(0, 2000) * np.abs(lift.nodes.states).max(axis=0)
     lift.lift(x[:1])
     return lift.lift, x
 

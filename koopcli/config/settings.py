@@ -75,8 +75,8 @@ class Evaluate:
     chunk: int = setting(2048, low=1, high=100_000_000, help="trajectories for each committed part")
     relift: bool | None = setting(
         None,
-        help="score predictions that are lifted afresh at every step too; else unless a lift composes lookups, which "
-        "would take minutes",
+        help="also score predictions that are lifted afresh at every step; else where a lift takes one lookup: with "
+        "several it takes minutes",
     )
     restart: int | None = setting(
         None,

@@ -23,7 +23,7 @@ FIGURE = FigureKind(
         recipes.evaluation(experiment, recipes.fit_eigen(recipes.best_eigen(experiment)))
     ],
     only="fit-eigen",
-    instead="it draws the experiment best-eigen; name an evaluation to choose another",
+    instead="it draws best-eigen; name an evaluation, such as one of quick-eigen, to choose another",
 )
 
 SMALLEST = 1e-6  # percent: what is drawn of an error of nothing

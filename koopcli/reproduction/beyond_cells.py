@@ -23,6 +23,7 @@ SHELLS, SHELL_STEPS, SHELL_TABLE = 6, 80, 0.3  # of the design by shells; s
 TABLE, HORIZON = 0.5, 0.5  # s, of trajectories of one second
 THINNED = 20  # nodes of each trajectory, where neighbours are not chosen apart
 LADDER, BUDGETS, EDMD, ABLATION, UNSEEN, MODES = "ladder", "budgets", "edmd", "ablation", "unseen", "modes"
+BEST_LABEL = "and composed lookups: best-eigen"
 BESIDE = {
     "EDMD, total, order 7": FitEdmd.of(basis="total", order=7),
     "EDMD, thin-plate, 300 centres": FitEdmd.of(basis="thin-plate", centres=300),
@@ -159,7 +160,7 @@ def quick_row(experiment: Experiment) -> Row:
 
 def best_row(experiment: Experiment) -> Row:
     """The last rung of the ladder."""
-    return Row("and composed lookups: best-eigen", "greedy, images", greedy(experiment), best_fit(experiment))
+    return Row(BEST_LABEL, "greedy, images", greedy(experiment), best_fit(experiment))
 
 
 def budgets(experiment: Experiment) -> Iterator[Row]:
@@ -172,7 +173,7 @@ def budgets(experiment: Experiment) -> Iterator[Row]:
         for budget in others:
             yield Row(f"{name} without images", "greedy", greedy(experiment, budget, plain=True), alone)
             yield Row(name, "greedy, images", greedy(experiment, budget), fit)
-    for budget in (main, max(others, default=main)):
+    for budget in dict.fromkeys((main, max(others, default=main))):
         yield Row(f"{recipes.BEST}, more rates", "greedy, images", greedy(experiment, budget), more_rates(experiment))
 
 

@@ -125,6 +125,8 @@ class Outlook:
     """Seconds for one step from states lifted afresh, however few they are."""
     a_state: float = 0.0
     """Seconds for each state that is moved on by one step, beside what its lifted states cost."""
+    a_lift: float = 0.0
+    """Seconds for each state that is lifted."""
 
 
 @dataclass(frozen=True)

@@ -117,6 +117,7 @@ def _estimate(task: Task) -> Cost:
     about, kinds = outlook(task.input("predictor")), 1 + bool(settings.relift)
     turns = steps * -(-n // min(settings.chunk, _together(steps)))
     seconds = bool(settings.relift) * turns * about.a_step
+    seconds += n * (1 + bool(settings.relift) * steps) * about.a_lift
     seconds += n * steps * (6e-9 * (about.functions + 100) + kinds * about.a_state)
     return Cost(seconds, 13e3 + 115.0 * n * -(-steps // (settings.restart or steps)))
 

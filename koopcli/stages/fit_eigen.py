@@ -12,6 +12,7 @@ from koopcli.koopman import stored
 from koopcli.koopman.eigen import fit as eigenfunctions
 from koopcli.koopman.eigen.fit import FitEigen
 from koopcli.koopman.eigen.futures import Futures
+from koopcli.koopman.eigen.held_back import SCORED
 from koopcli.koopman.eigen.recurrence import Surface, check_recurrence, check_starts
 from koopcli.koopman.eigen.tabulated import Tabulated
 from koopcli.koopman.eigen.windows import Ahead, AlongTrajectory
@@ -24,6 +25,7 @@ from koopcli.stages.roles import finished
 from koopcli.vehicles.plants import remembered_plant
 from koopcli.vehicles.symmetry import images
 
+A_LOOKUP = 1.5e-4  # seconds
 SEVERAL = "where trajectories from several energies meet, an eigenfunction has several values, and the lift blends them"
 
 
@@ -123,7 +125,15 @@ def _outlook(task: Task) -> Outlook:
         plant = simulation.settings
         eigenfunctions.check_window(plant.steps, fit, plant.dt)
         horizon = fit.window.horizon_steps(fit, plant.steps, plant.dt)
-    return Outlook(copies * fit.eigenvalues.count(n_x), horizon, fit.window.name(fit))
+    lift = A_LOOKUP * _lookups(fit, horizon)
+    return Outlook(copies * fit.eigenvalues.count(n_x), horizon, fit.window.name(fit), a_lift=lift)
+
+
+def _lookups(fit: FitEigen, horizon: int | None) -> int:
+    """Lookups of a lift that each solve for weights."""
+    if not isinstance(fit.window, Ahead) or not fit.lift.counts_neighbours:
+        return 0
+    return 1 if fit.window.lookup_steps is None else -(-(horizon or 1) // fit.window.lookup_steps)
 
 
 def _estimate(task: Task) -> Cost:
@@ -134,7 +144,8 @@ def _estimate(task: Task) -> Cost:
     seconds = 0.3 + 2e-9 * J * wide * min(J, wide) + 1e-9 * J * simulation.steps * min(J, wide)
     copies = 2 ** len(fit.mirror)
     if isinstance(fit.window, Ahead):
-        seconds, table = seconds + 3.0 * fit.window.trust, copies * 3 * J * (simulation.steps + 1)
+        seconds += fit.window.trust * (1.0 + SCORED * _outlook(task).a_lift)
+        table = copies * 3 * J * (simulation.steps + 1)
     return Cost(seconds, 8.0 * (2 * copies * table + J * min(J, wide) + 7 * functions))
 
 

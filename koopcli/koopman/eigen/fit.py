@@ -49,7 +49,7 @@ class FitEigen(Settings):
         empty=True,
         above=0,
         high=1e6,
-        help="distances: what counts as one, as a share of the largest magnitude of each state; else all of it",
+        help="distances: the unit of each state, as a share of its largest magnitude; else all of that",
     )
     mirror: tuple[Mirror, ...] = setting(
         (),
@@ -109,6 +109,11 @@ def check_window(steps: int, how: FitEigen, dt: float) -> None:
     tabulated, horizon = how.tabulated(dt), how.window.horizon_steps(how, steps, dt)
     lookup_steps = how.window.lookup_steps
     composed = lookup_steps is not None
+    if lookup_steps is not None and horizon < lookup_steps <= steps:
+        raise InvalidValueError(
+            f"'fit-eigen.lookup_steps' of {lookup_steps} is longer than the horizon of {horizon} steps: leave it "
+            "out to look the whole horizon up at once"
+        )
     if lookup_steps is not None and lookup_steps > steps:
         raise InvalidValueError(
             f"'fit-eigen.lookup_steps' of {lookup_steps} is longer than trajectories of {steps} steps: look up "

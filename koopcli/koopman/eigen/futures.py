@@ -52,7 +52,7 @@ class Futures(Content):
     @property
     def ahead(self) -> int:
         """Steps that one lookup gives."""
-        return self.horizon if self.lookup_steps is None else min(self.lookup_steps, self.horizon)
+        return self.horizon if self.lookup_steps is None else self.lookup_steps
 
     def future(self, x: FloatArray) -> FloatArray:
         """What follows the states ``x`` (n, n_x), interpolated: (n, horizon + 1, n_x). The first sample is x."""

@@ -130,7 +130,7 @@ class Ahead(Window):
 
     def name(self, how: FitEigen) -> str:
         """What a predictor with it is called."""
-        return f"eigenfunctions, {how.lift.kind if self.lookup_steps is None else 'composed lookups'}"
+        return f"eigenfunctions, {'' if self.lookup_steps is None else 'composed '}{how.lift.kind}"
 
     def horizon_steps(self, how: FitEigen, steps: int, dt: float) -> int:
         """The longest prediction."""
@@ -150,7 +150,8 @@ class Ahead(Window):
             )
         if self.rounds and self.lookup_steps is not None:
             raise InvalidValueError(
-                "'fit-eigen.rounds' has no effect with fit-eigen.lookup_steps: a short lookup needs no continuation"
+                "'fit-eigen.rounds' has no effect with fit-eigen.lookup_steps: a short lookup needs no continuation; "
+                "set fit-eigen.rounds=0, or take the experiment best-eigen"
             )
         check_frame(self.coordinates, states)
 

@@ -39,7 +39,7 @@ class Cloud:
         for start in range(0, len(y), TOGETHER):
             some = pool[start : start + TOGETHER]
             left_out = ~_spaced(self.trajectory[some], self.sample[some], self.spacing)
-            order = np.argsort(left_out, axis=1, kind="stable")[:, : self.neighbours]  # others, where they are too few
+            order = np.argsort(left_out, axis=1, kind="stable")[:, : self.neighbours]  # left-out nodes fill up
             order.sort(axis=1)
             near[start : start + TOGETHER] = some[np.arange(len(some))[:, np.newaxis], order]
         return near
