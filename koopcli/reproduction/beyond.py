@@ -187,7 +187,7 @@ def pictures(experiment: Experiment) -> list[Picture]:
         about = f"Errors by initial state, {vehicle}: the paper's surface, lattice and nearest sample, quick-eigen and "
         about += "best-eigen."
         labels = {first: "before", quick: recipes.QUICK, best: recipes.BEST}
-        shipped = {quick: recipes.QUICK, best: recipes.BEST}
+        shipped = {best: recipes.BEST, quick: recipes.QUICK}
         taken = {best: "best-eigen", **{blocks.evaluated(row, own, seed): row.label for row in blocks.ablation(own)}}
         pictured += [
             Picture(draw("before-after", list(labels), labels=labels), about),

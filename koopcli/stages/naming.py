@@ -105,6 +105,7 @@ def _seconds(evaluation: Task, experiment: Experiment) -> Series:
         parts = [fit.eigenvalues.kind, fit.lift.kind]
         parts += ["world"] if getattr(fit.window, "coordinates", "") == "world" else []
         parts += ["continued"] if fit.window.rounds else []
+        parts += ["composed"] if fit.window.lookup_steps else []
         about = ", ".join([sample.kind, *parts, *(f"{mirror} images" for mirror in fit.mirror)])
     return Series(f"{vehicle}{about}", sample.trajectories * steps.steps * steps.dt)
 
