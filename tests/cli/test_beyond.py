@@ -184,14 +184,21 @@ def test_beyond_in_one_command(koop, folder, beyond):
     blocks = {cell["block"] for cell in cells}
     assert blocks == {"ladder", "budgets", "edmd", "ablation", "modes", "unseen"}
     ladder = [c for c in cells if c["block"] == "ladder" and c["vehicle"] == "ctu-2020" and c["seed"] == 0]
-    assert len(ladder) == 14
+    assert len(ladder) == 15
     assert ladder[-1]["rmse"]["mean"] < ladder[0]["rmse"]["mean"] / 2
     assert ladder[-1]["simulated"] == pytest.approx(30)
     assert all(cell["query"] > 0 and cell["build"] > 0 for cell in ladder)
     drawn = [one["figure"] for one in found["figures"] if one["method"] == "beyond"]
-    assert drawn == ["frontier", *(["before-after", "trust", "modes", "compare"] * 2)]
+    of_a_vehicle = ["before-after", "trust", "trust", "horizon", "modes", "compare"]
+    assert drawn == ["frontier", *(of_a_vehicle * 2)]
     assert all(one["name"] for one in found["figures"])
-    for title in ("Beyond the paper: RMSE", "One ingredient taken away", "How many modes", "Trust: 90 % bounds"):
+    for title in (
+        "Beyond the paper: RMSE",
+        "Where the error of best-eigen comes from",
+        "One ingredient taken away",
+        "How many modes",
+        "Trust: 90 % bounds",
+    ):
         assert title in result.err
     page = next((folder / "artefacts" / "reports").glob("*/report.html")).read_text()
     assert "koop reproduce eigen --beyond --experiment" in re.sub("<[^>]*>", "", page)
