@@ -92,18 +92,19 @@ def _option(name: str, uses: Sequence[Use]) -> Any:
     for use in uses:
         by_help.setdefault(use.help, []).append(use.kind)
     parts = [f"{', '.join(kinds)}: {text}" if any(kinds) else _capital(text) for text, kinds in by_help.items()]
-    return _annotated(name, hint, f"{'; '.join(parts)}{_default(uses)}.")
+    return _annotated(name, hint, f"{'; '.join(parts)}{_default(uses)}.", denied=default is None)
 
 
-def _annotated(name: str, hint: Any, text: str) -> Any:
-    """The type of an option with its help."""
+def _annotated(name: str, hint: Any, text: str, *, denied: bool = False) -> Any:
+    """The type of an option with its help. ``denied``: a flag has an option that denies it beside it."""
     if get_origin(hint) is tuple:
         names = list(get_args(get_args(hint)[0]))
         text = f"{text} The option may be given twice."
         option = typer.Option(metavar="|".join(names), autocompletion=lambda: names, help=text)
         return Annotated[list[str] | None, option]
     if hint is bool:
-        return Annotated[bool | None, typer.Option(f"--{name.replace('_', '-')}", help=text)]
+        flag = name.replace("_", "-")
+        return Annotated[bool | None, typer.Option(f"--{flag}/--no-{flag}" if denied else f"--{flag}", help=text)]
     metavar = "|".join(get_args(hint)) if get_origin(hint) is Literal else None
     return Annotated[hint | None, typer.Option(metavar=metavar, help=text)]
 

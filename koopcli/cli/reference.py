@@ -76,7 +76,7 @@ def _command(name: str, command: Any) -> Iterator[str]:
     for parameter in arguments:
         yield f"* `{_metavar(parameter)}`: {parameter.help}"
     for parameter in options:
-        yield f"* `{' / '.join(parameter.opts)}{_value(parameter)}`: {parameter.help}"
+        yield f"* `{' / '.join([*parameter.opts, *parameter.secondary_opts])}{_value(parameter)}`: {parameter.help}"
     yield ""
 
 

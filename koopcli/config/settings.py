@@ -43,6 +43,17 @@ class Simulate:
         option=True,
         help="integrate by a solver that controls its error, slowly, and say how far the usual integration is off",
     )
+    noise: float = setting(
+        0.0,
+        low=0,
+        high=1e6,
+        unit="m/s",
+        option=True,
+        help="noise on trajectories as they are stored, of which test sets have none: on rates of turning a tenth of "
+        "it in rad/s, on velocities a standard deviation",
+    )
+    noise_seed: int = setting(0, low=0, high=SEED_LIMIT, help="which noise is drawn")
+    noise_memory: float = setting(0.0, low=0, high=0.999, help="share of the noise that stays in the next sample")
     chunk: int | None = setting(
         None,
         low=1,
@@ -53,7 +64,13 @@ class Simulate:
     def settled(self, plant: PlantChoice, steps: int) -> Simulate:
         """The same simulation of a ``plant``, over so many ``steps`` where that is open."""
         chunk = plant.chunk if self.chunk is None else self.chunk
-        return replace(self, plant=plant, vehicle=plant.used(self.vehicle), steps=self.steps or steps, chunk=chunk)
+        same = self if self.noise else self.clean()
+        return replace(same, plant=plant, vehicle=plant.used(self.vehicle), steps=self.steps or steps, chunk=chunk)
+
+    def clean(self) -> Simulate:
+        """The same simulation without noise."""
+        usual = Simulate
+        return replace(self, noise=usual.noise, noise_seed=usual.noise_seed, noise_memory=usual.noise_memory)
 
 
 @dataclass(frozen=True)
@@ -120,6 +137,14 @@ class Reproduce:
         unique=True,
         empty=True,
         help="beyond: vehicles for the best fit alone",
+    )
+    noises: tuple[float, ...] = setting(
+        (0.01, 0.05, 0.1),
+        above=0,
+        high=1e6,
+        unique=True,
+        unit="m/s",
+        help="beyond: noise of training trajectories",
     )
     pairs: tuple[int, ...] = setting(
         (1, 2, 3, 4, 6, 8, 10), low=1, high=1000, unique=True, help="beyond: pairs of rates of the mode sweep"

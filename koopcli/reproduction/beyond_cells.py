@@ -23,6 +23,7 @@ SHELLS, SHELL_STEPS, SHELL_TABLE = 6, 80, 0.3  # of the design by shells; s
 TABLE, HORIZON = 0.5, 0.5  # s, of trajectories of one second
 THINNED = 20  # nodes of each trajectory, where neighbours are not chosen apart
 LADDER, BUDGETS, EDMD, ABLATION, UNSEEN, MODES = "ladder", "budgets", "edmd", "ablation", "unseen", "modes"
+NOISE, MEMORY = "noise", 0.8  # and how much of coloured noise stays from sample to sample
 BEST_LABEL = "and composed lookups: best-eigen"
 BESIDE = {
     "EDMD, total, order 7": FitEdmd.of(basis="total", order=7),
@@ -36,7 +37,8 @@ STATES = 3  # of the plant on tyres
 @dataclass(frozen=True)
 class BeyondCell:
     """One predictor on the test states of one seed. ``block`` is the table it stands in, ``design`` its initial states
-    and ``simulated`` the seconds of its trajectories; ``modes``: how many rates it has, where they are swept.
+    and ``simulated`` the seconds of its trajectories; ``modes``: how many rates it has, where they are swept;
+    ``noise``: that of its trajectories, in words.
     """
 
     block: str
@@ -46,17 +48,22 @@ class BeyondCell:
     vehicle: str
     seed: int
     modes: int = 0
+    noise: str = ""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A predictor before it is put to a vehicle and to test states: initial ``states``, and its ``fit``."""
+    """A predictor before it is put to a vehicle and to test states: initial ``states``, and its ``fit``; the ``noise``
+    of its trajectories in m/s, and its ``memory``.
+    """
 
     label: str
     design: str
     states: SampleChoice
     fit: FitEigen | FitEdmd
     modes: int = 0
+    noise: float = 0.0
+    memory: float = 0.0
 
 
 AHEAD = FitEigen.of(window="horizon", eigenvalues="comb", cut=CUT, tabulate=TABLE, horizon=HORIZON)
@@ -66,7 +73,8 @@ def cells(experiment: Experiment) -> Iterator[tuple[BeyondCell, Task]]:
     """Every cell with its evaluation."""
     seeds, everywhere = experiment.reproduce.seeds[:2], recipes.vehicles(experiment)
     for (vehicle, own), seed in product(everywhere, seeds):
-        yield from _cells({LADDER: ladder(own), BUDGETS: budgets(own), EDMD: beside(own)}, vehicle, own, seed)
+        rows = {LADDER: ladder(own), BUDGETS: budgets(own), EDMD: beside(own), NOISE: noisy(own)}
+        yield from _cells(rows, vehicle, own, seed)
     for vehicle, own in everywhere:
         yield from _cells({ABLATION: ablation(own), MODES: sweep(own)}, vehicle, own, seeds[0])
     for (vehicle, own), seed in product(unseen(experiment), seeds):
@@ -82,16 +90,20 @@ def _cells(
             task = evaluated(row, own, seed)
             simulation = task.input("predictor").ancestor("simulate").settings
             simulated = row.states.trajectories * simulation.steps * simulation.dt
-            yield BeyondCell(block, row.label, row.design, simulated, vehicle, seed, row.modes), task
+            noise = f"{row.noise:g}{', coloured' if row.memory else ''}" if row.noise else ""
+            yield BeyondCell(block, row.label, row.design, simulated, vehicle, seed, row.modes, noise), task
 
 
 def evaluated(row: Row, experiment: Experiment, seed: int) -> Task:
     """The evaluation of a row on the test states of a seed, where predictions are not lifted afresh at every step, and
     trajectories are as long as their samples say.
     """
+    simulate = replace(experiment.simulate, steps=None, plant=None)
+    if row.noise:
+        simulate = replace(simulate, noise=row.noise, noise_memory=row.memory)
     own = replace(
         experiment,
-        simulate=replace(experiment.simulate, steps=None, plant=None),
+        simulate=simulate,
         evaluate=replace(experiment.evaluate, relift=False),
     )
     training = recipes.simulation(own, recipes.sample(row.states), plant="slips")
@@ -175,6 +187,21 @@ def budgets(experiment: Experiment) -> Iterator[Row]:
             yield Row(name, "greedy, images", greedy(experiment, budget), fit)
     for budget in dict.fromkeys((main, max(others, default=main))):
         yield Row(f"{recipes.BEST}, more rates", "greedy, images", greedy(experiment, budget), more_rates(experiment))
+
+
+def noisy(experiment: Experiment) -> Iterator[Row]:
+    """Predictors of trajectories with noise, as it comes and smoothed; of the largest also coloured, and looked up
+    among more neighbours.
+    """
+    states, shipped = greedy(experiment), {recipes.QUICK: quick_fit(experiment), recipes.BEST: best_fit(experiment)}
+    largest = max(experiment.reproduce.noises)
+    cases = [(noise, 0.0) for noise in experiment.reproduce.noises]
+    for (noise, memory), (name, fit) in product([*cases, (largest, MEMORY)], shipped.items()):
+        raw = fit.but(smooth=False, trust=False)
+        yield Row(f"{name} --no-smooth", "greedy, images", states, raw, noise=noise, memory=memory)
+        yield Row(name, "greedy, images", states, fit, noise=noise, memory=memory)
+    wide = shipped[recipes.BEST].but(neighbours=2 * shipped[recipes.BEST].lift.neighbours, trust=False)
+    yield Row(f"{recipes.BEST}, {wide.lift.neighbours} neighbours", "greedy, images", states, wide, noise=largest)
 
 
 def beside(experiment: Experiment) -> Iterator[Row]:

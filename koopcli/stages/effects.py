@@ -93,7 +93,8 @@ def _reason(name: str, tasks: Sequence[Task], steps: Sequence[Task]) -> str:
         return "the excitation 'none' has no use for it"
     plants += [sample.meant_for.kind for sample in samples if hasattr(sample, "vehicle")]
     if section in ("vehicle", "simulate") and plants:
-        return f"the plant '{plants[0]}' has no use for it"
+        noise = "there is no noise without simulate.noise"
+        return noise if key.startswith("noise_") else f"the plant '{plants[0]}' has no use for it"
     if section == "vehicle":
         names = " and ".join(taken(type(samples[0])))
         return f"a sample of kind '{samples[0].kind}' takes {names} of the vehicle alone"

@@ -198,6 +198,7 @@ def is_product(settings: FitEdmd, data: Sequence[Task]) -> bool:
     """Whether the fit averages over the inputs of a product of states with inputs, which is read at once."""
     sample = data[0].find("sample")
     grid = sample is not None and isinstance(sample.settings, GridSample) and data[0].settings.steps == 1
+    grid = grid and not data[0].settings.noise
     return grid and len(data) == 1 and not settings.plain and settings.basis.makes.constant is not None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,14 +12,16 @@ from koopcli.errors import InvalidValueError
 from koopcli.koopman import stored
 from koopcli.koopman.eigen import fit as eigenfunctions
 from koopcli.koopman.eigen.fit import FitEigen
+from koopcli.koopman.eigen.frames import PLANAR
 from koopcli.koopman.eigen.futures import Futures
 from koopcli.koopman.eigen.held_back import SCORED
 from koopcli.koopman.eigen.recurrence import Surface, check_recurrence, check_starts
+from koopcli.koopman.eigen.smoothing import check_length, noisy, smoothed
 from koopcli.koopman.eigen.tabulated import Tabulated
-from koopcli.koopman.eigen.windows import Ahead, AlongTrajectory
+from koopcli.koopman.eigen.windows import COMPOSED, Ahead, AlongTrajectory
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.koopman.scores.metrics import summary
-from koopcli.records import FloatArray, Meta, Trajectories
+from koopcli.records import Channels, FloatArray, Meta, Trajectories
 from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task, refuse_beyond_memory
 from koopcli.stages.predictors import figures, regression, size
 from koopcli.stages.roles import finished
@@ -33,19 +36,46 @@ def _run(settings: FitEigen, inputs: Inputs, context: Context) -> Predictor:
     trajectories = finished(inputs["trajectories"], context)
     context.progress(0, 2)
     x = eigenfunctions.autonomous(trajectories)
+    x, settings, noise = _without_noise(x, trajectories, settings, context)
     _check_surface(x, trajectories, context)
     context.progress(1, 2)
     trajectories = replace(trajectories, x=x)  # not read again
     plant = remembered_plant(trajectories.plant) if settings.mirror else None
     signs = [] if plant is None else images(settings.mirror, plant.parameters, plant.states.names)
     complete = eigenfunctions.with_images(trajectories, signs)
-    return eigenfunctions.fit(complete, settings, 1 + len(signs), context.progress)
+    predictor = eigenfunctions.fit(complete, settings, 1 + len(signs), context.progress)
+    return replace(predictor, regression=replace(predictor.regression, noise=noise))
+
+
+def _without_noise(
+    x: FloatArray, trajectories: Trajectories, settings: FitEigen, context: Context
+) -> tuple[FloatArray, FitEigen, tuple[float, ...] | None]:
+    """The states, smoothed where that is asked for or noise is seen; the settings with that settled; the deviation of
+    the noise of each state.
+    """
+    seen = noisy(x)
+    settings = replace(settings, smooth=seen if settings.smooth is None else settings.smooth)
+    if not settings.smooth:
+        if seen:
+            context.warn("the trajectories hold noise, which is left in them: smooth them with --smooth")
+        return x, settings, None
+    names = trajectories.state_channels.names
+    x, variance = smoothed(x, trajectories.dt, turns=names[: len(PLANAR)] == PLANAR)
+    noise, motion = np.sqrt(variance.mean(axis=0)), np.sqrt((x**2).mean(axis=(0, 1)))
+    for state, moved in zip(_deviations(trajectories.state_channels, noise.tolist()), motion.tolist(), strict=True):
+        if state["deviation"] > moved:
+            context.warn(
+                f"the noise in {state['state']} ({state['deviation']:.2g} {state['unit']}) is larger than the motion "
+                f"({moved:.2g} {state['unit']}): no softness of a spline helps against it; measure with less noise, or "
+                "more trajectories"
+            )
+    return x, settings, tuple(noise.tolist())
 
 
 def _figures(predictor: Predictor) -> Meta:
     lift, trust = predictor.observables, predictor.trust
     assert isinstance(lift, (Tabulated, Futures))
-    modes = lift.modes
+    modes, noise, lookup = lift.modes, predictor.regression.noise, lift.nodes.search.lift
     return {
         **figures(predictor),
         "rates": modes.rates.real.tolist(),
@@ -54,12 +84,24 @@ def _figures(predictor: Predictor) -> Meta:
         "missed": predictor.regression.missed,
         "nodes": len(lift.nodes.kept),
         "beyond": f"predictions from outside the hull of the data {predictor.beyond}",
+        "noise": None if noise is None else _deviations(predictor.state_channels, noise),
+        "softness": getattr(lookup, "softness", None),
         "trust": None if trust is None else {"level": trust.level, **summary(trust.errors)},
     }
 
 
+def _deviations(states: Channels, noise: Sequence[float]) -> list[Meta]:
+    every = zip(states.names, states.units, noise, strict=True)
+    return [{"state": name, "unit": unit, "deviation": deviation} for name, unit, deviation in every]
+
+
 def _describe(figures: Meta, settings: FitEigen) -> str:
     text = f"{size(figures)}; {figures['modes']} modes represent the data to {figures['missed']:.2g} %"
+    if figures["noise"] is not None:
+        deviations = ", ".join(f"{a['deviation']:.2g} {a['unit']} in {a['state']}" for a in figures["noise"])
+        text += f"; noise smoothed away: {deviations}"
+    if figures["softness"] is not None:
+        text += f"; softness {figures['softness']:g}"
     if figures["trust"] is not None:
         text += f"; median error in cross-validation {figures['trust']['median']:.2g} %"
     cut = "rounding" if settings.window.cut is None else f"{settings.window.cut:g}"
@@ -104,6 +146,8 @@ def _check(task: Task) -> None:
     fit.window.check(states)
     fit.check_scale(len(states))
     eigenfunctions.check_window(plant.steps, fit, plant.dt)
+    if fit.smooth:
+        check_length(plant.steps + 1)
     eigenfunctions.check_modes(fit.eigenvalues.count(len(states)), fit.window.length(fit, plant.steps, plant.dt))
     images(fit.mirror, plant.vehicle, states.names)
     if sample is not None:
@@ -144,14 +188,17 @@ def _estimate(task: Task) -> Cost:
     seconds = 0.3 + 2e-9 * J * wide * min(J, wide) + 1e-9 * J * simulation.steps * min(J, wide)
     copies = 2 ** len(fit.mirror)
     if isinstance(fit.window, Ahead):
-        seconds += fit.window.trust * (1.0 + SCORED * _outlook(task).a_lift)
+        a_lift = _outlook(task).a_lift
+        seconds += fit.window.trust * (1.0 + SCORED * a_lift)
+        smooths = bool(simulation.noise) if fit.smooth is None else fit.smooth
+        seconds += smooths * len(fit.lift.softer()) * (0.5 + COMPOSED * a_lift)
         table = copies * 3 * J * (simulation.steps + 1)
     return Cost(seconds, 8.0 * (2 * copies * table + J * min(J, wide) + 7 * functions))
 
 
 STAGE = Stage(
     name="fit-eigen",
-    version=4,
+    version=5,
     settings=lambda values: restored(FitEigen, values),
     run=_run,
     unpack=stored.predictor,

@@ -84,13 +84,13 @@ def test_set(experiment: Experiment, plant: Simulate, **changed: object) -> Task
         kind = PointSample.kind
     alike = replace(experiment, simulate=replace(experiment.simulate, dt=plant.dt))
     settings = replace(alike.test(kind, plant.vehicle), **changed)  # type: ignore[type-var]
-    return Task("simulate", replace(plant, steps=settings.horizon), (("sample", sample(settings)),))
+    return Task("simulate", replace(plant.clean(), steps=settings.horizon), (("sample", sample(settings)),))
 
 
 def driven(experiment: Experiment, plant: Simulate) -> Task:
     """The one trajectory that the paper draws with random inputs, of ``plant`` with its vehicle and period."""
     start = experiment.tabled("point")
-    return Task("simulate", replace(plant, steps=start.horizon), (("sample", sample(start)),))
+    return Task("simulate", replace(plant.clean(), steps=start.horizon), (("sample", sample(start)),))
 
 
 def remembered_simulation(about: Meta, dt: float) -> Simulate:

@@ -13,6 +13,7 @@ from koopcli.errors import InvalidValueError
 from koopcli.progress import Progress
 from koopcli.records import ENDS, Course, Meta, Packed, Sample, Trajectories, join
 from koopcli.simulation.integrate import STIFF, integrate
+from koopcli.simulation.noise import deviations, measured
 from koopcli.simulation.reference import reference
 from koopcli.simulation.samples.manoeuvre import ManoeuvreSample
 from koopcli.simulation.samples.sample import SampleChoice
@@ -28,7 +29,7 @@ SLOWER = 100  # by so much are chunks of the reference solver smaller
 def _run(settings: Simulate, inputs: Inputs, context: Context) -> Trajectories:
     sample: Sample = inputs["sample"]
     parts = [Trajectories.unpack(part) for part in context.chunks(sample.trajectories, _rows(settings))]
-    trajectories = replace(join(parts), product=sample.product)
+    trajectories = replace(join(parts), product=None if settings.noise else sample.product)  # first states differ then
     assert trajectories.course is not None, "of what was simulated here"
     _report(trajectories.course, context)
     return trajectories
@@ -42,6 +43,9 @@ def _chunk(settings: Simulate, inputs: Inputs, rows: slice, progress: Progress) 
         x, course = reference(plant.rhs, x0, u, settings.dt, progress)
     else:
         x, course = integrate(plant.rhs, x0, u, settings.dt, progress, plant.fastest_rate)
+    if settings.noise:
+        deviation = deviations(settings.noise, plant.states)
+        x = measured(x, rows.start, deviation, settings.noise_seed, settings.noise_memory)
     assert settings.plant is not None, "settled from the sample"
     own = written(settings.plant)
     about = {"plant": own.pop("kind"), **own, "vehicle": written(settings.vehicle)}
@@ -97,6 +101,8 @@ def _describe(figures: Meta, settings: Simulate) -> str:
             f"{most['min']} to {most['max']}, median {most['median']:g}" if most["min"] < most["max"] else most["max"]
         )
         text += f", substeps at most: {span}"
+    if settings.noise:
+        text += f", with noise of {settings.noise:g} m/s"
     return "; ".join([text, *(f"{count} {reason}" for reason, count in figures["ended"].items())])
 
 

@@ -59,6 +59,9 @@ class FitEigen(Settings):
         help="mirror images of the trajectories that are data too: of a car that is the same to the left and to the "
         "right, or at both axles",
     )
+    smooth: bool | None = setting(
+        None, option=True, help="smooth each trajectory and choose the softness of splines; else where noise is seen"
+    )
 
     def tabulated(self, dt: float) -> int:
         """Steps of ``dt`` s of each trajectory that are looked up."""

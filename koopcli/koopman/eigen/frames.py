@@ -30,7 +30,7 @@ def yaw(yaw_rate: FloatArray, dt: float) -> FloatArray:
     return angle
 
 
-def _turned(x: FloatArray, angle: FloatArray) -> FloatArray:
+def turned(x: FloatArray, angle: FloatArray) -> FloatArray:
     """``x`` with its velocity turned to the left by ``angle``."""
     c, s = np.cos(angle), np.sin(angle)
     out = x.copy()
@@ -41,13 +41,13 @@ def _turned(x: FloatArray, angle: FloatArray) -> FloatArray:
 
 def _in_the_world(x: FloatArray, dt: float) -> FloatArray:
     """The change since the first sample of the velocity in axes that stay, and of every other state."""
-    turned = _turned(x, yaw(x[..., 2], dt))
-    return turned - turned[:, :1]
+    moving = turned(x, yaw(x[..., 2], dt))
+    return moving - moving[:, :1]
 
 
 def _in_the_body(seen: FloatArray, x0: FloatArray, dt: float) -> FloatArray:
-    turned = seen + x0[:, np.newaxis]
-    return _turned(turned, -yaw(turned[..., 2], dt))
+    moving = seen + x0[:, np.newaxis]
+    return turned(moving, -yaw(moving[..., 2], dt))
 
 
 FRAMES: dict[str, Frame] = {

@@ -27,7 +27,8 @@ class Futures(Content):
     ``trajectories`` (J, samples, n_x); ``nodes``: those of their samples that are looked up; ``frame``: in which what
     follows them is interpolated; ``projection`` (L, horizon + 1): from the samples of a future to the states of a
     block of ``modes``, of which each state of the plant has one. A lookup gives ``lookup_steps`` steps, the next one
-    begins where it ends (7.20); one alone gives the whole horizon if None.
+    begins where it ends (7.20); one alone gives the whole horizon if None. ``tabled``: whether what follows every node
+    is put together once, which pays where many states are asked for.
     """
 
     trajectories: FloatArray
@@ -36,6 +37,7 @@ class Futures(Content):
     projection: FloatArray
     modes: Modes
     lookup_steps: int | None = None
+    tabled: bool = True
 
     kind = "futures"
 
@@ -88,7 +90,7 @@ class Futures(Content):
         from scipy.sparse import csr_matrix  # noqa: PLC0415  (what only reads a predictor goes without)
 
         indices, weights = self.nodes.find(x)
-        if self._table_bytes > LARGEST_TABLE:
+        if not self.tabled or self._table_bytes > LARGEST_TABLE:
             return self._gathered(indices, weights)
         if len(x) <= FEW:
             return np.asarray(np.matmul(weights[:, np.newaxis], self._values[indices])[:, 0])
@@ -97,7 +99,7 @@ class Futures(Content):
         return np.asarray(table @ self._values)
 
     def _gathered(self, indices: IndexArray, weights: FloatArray) -> FloatArray:
-        """The same where a table of all nodes would be too large: what follows those that are found."""
+        """The same without a table of all nodes: what follows those that are found."""
         gathered = np.empty((len(indices), self._width))
         for start in range(0, len(indices), GATHERED):
             rows = slice(start, start + GATHERED)

@@ -26,18 +26,19 @@ def held_back(
     groups: IndexArray,
     predict: Callable[[Futures, FloatArray], FloatArray],
     progress: Progress = silent,
+    scored: int = SCORED,
 ) -> Trust:
     """The estimate for ``futures``, from predicting some of its samples without the trajectories of their group.
 
     ``known``: the last sample whose whole future is data and no continuation; ``groups`` (J,): trajectories of one
     group, such as mirror images, are held back together; ``predict(part, x0)`` gives what a predictor of a part of the
-    nodes says, (n, horizon + 1, n_x).
+    nodes says, (n, horizon + 1, n_x); ``scored``: at how many samples.
     """
     nodes, horizon = futures.nodes, futures.horizon
     members = np.unique(groups)
     _, first = np.unique(groups, return_index=True)
     count = known + 1
-    chosen = spread(len(first) * count, SCORED)
+    chosen = spread(len(first) * count, scored)
     j, k = first[chosen // count], chosen % count
     truth = futures.trajectories[j[:, np.newaxis], k[:, np.newaxis] + np.arange(horizon + 1)]
     x = truth[:, 0]
@@ -49,10 +50,12 @@ def held_back(
         progress(done, len(folds))
         rows = np.flatnonzero(of_group[j] == group)
         rest = nodes.only(np.flatnonzero(of_group[nodes.trajectory] != group))
+        asked = len(rows) * nodes.search.lift.neighbours * -(-horizon // futures.ahead)
+        part = replace(futures, nodes=rest, tabled=asked > len(rest.kept))
         try:
-            error[rows] = rmse(predict(replace(futures, nodes=rest), x[rows]), truth[rows])
+            error[rows] = rmse(predict(part, x[rows]), truth[rows])
         except InvalidValueError as reason:
             raise InvalidValueError(f"with trajectories held back for fit-eigen.trust, {reason}") from reason
-    scored = np.isfinite(error)
+    known_error = np.isfinite(error)
     scale, power = nodes.search.scale, nodes.search.power
-    return calibrated(x[scored], np.maximum(error[scored], SMALLEST), groups[j[scored]], scale, power)
+    return calibrated(x[known_error], np.maximum(error[known_error], SMALLEST), groups[j[known_error]], scale, power)

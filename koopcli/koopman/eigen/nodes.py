@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -64,6 +64,10 @@ class Nodes(Content):
     def only(self, chosen: IndexArray) -> Nodes:
         """Those nodes alone."""
         return Nodes(self.search, self.states[chosen], self.kept[chosen], self.samples)
+
+    def looked_up_by(self, lift: Lift) -> Nodes:
+        """The same nodes under another lookup."""
+        return replace(self, search=replace(self.search, lift=lift))
 
     @cached_property
     def _lookup(self) -> Lookup:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -13,19 +15,23 @@ from koopcli.koopman.eigen import boundary
 from koopcli.koopman.eigen.boundary import Boundary, BoundarySplines
 from koopcli.koopman.eigen.frames import check_frame
 from koopcli.koopman.eigen.futures import Futures
-from koopcli.koopman.eigen.held_back import held_back
-from koopcli.koopman.eigen.nodes import nodes_of
+from koopcli.koopman.eigen.held_back import SCORED, held_back
+from koopcli.koopman.eigen.lookup.lookup import Lift
+from koopcli.koopman.eigen.nodes import Search, nodes_of
 from koopcli.koopman.eigen.tabulated import Tabulated
 from koopcli.koopman.predictor.coverage import coverage_of
 from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
 from koopcli.koopman.predictor.modes import Modes
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.koopman.predictor.regression import Regression
-from koopcli.progress import Progress
+from koopcli.koopman.predictor.trust import Trust
+from koopcli.progress import Progress, silent
 from koopcli.records import Channels, FloatArray, Trajectories
 
 if TYPE_CHECKING:
     from koopcli.koopman.eigen.fit import FitEigen
+
+COMPARED, COMPOSED = 1000, 300  # states at which lookups are compared, and composed ones
 
 
 class Window(Choice):
@@ -158,39 +164,74 @@ class Ahead(Window):
     def fit(
         self, trajectories: Trajectories, x: FloatArray, how: FitEigen, modes: Modes, images: int, progress: Progress
     ) -> Predictor:
-        """Lifted states fitted to what follows within the horizon."""
+        """Lifted states fitted to what follows within the horizon. The softness of the lookup is chosen first where
+        noise was smoothed and it is open.
+        """
         check_frame(self.coordinates, trajectories.state_channels)
         tabulated, n_x = how.tabulated(modes.dt), x.shape[2]
         horizon = self.horizon_steps(how, trajectories.steps, modes.dt)
         time = boundary.time_part(modes, horizon + 1)
         cut = boundary.kept(self.cut, horizon + 1)
         onto, modes = boundary.projection(time, cut), replace(modes, copies=n_x)
-        search = how.search(x)
         known = min(x.shape[1] - 1 - horizon, tabulated)
 
-        def futures(data: FloatArray, samples: int) -> Futures:
+        def futures(data: FloatArray, samples: int, search: Search) -> Futures:
             nodes = nodes_of(data, samples, search, how.nodes)
             return Futures(data, nodes, self.coordinates, onto, modes, self.lookup_steps)
 
-        if self.lookup_steps is not None:
-            lift = futures(x, min(x.shape[1] - 1 - self.lookup_steps, tabulated) + 1)
-        else:
-            lift = futures(x, known + 1)
+        def lifted(lookup: Lift) -> Futures:
+            search = replace(how, lift=lookup).search(x)
+            if self.lookup_steps is not None:
+                return futures(x, min(x.shape[1] - 1 - self.lookup_steps, tabulated) + 1, search)
+            lift = futures(x, known + 1, search)
             for _ in range(self.rounds if tabulated > known else 0):
                 ahead = lift.future(x[:, -1])[:, 1 : tabulated - known + 1]
-                lift = futures(np.concatenate([x, ahead], axis=1), tabulated + 1)
+                lift = futures(np.concatenate([x, ahead], axis=1), tabulated + 1, search)
+            return lift
+
         C = boundary.read_off(n_x, len(modes.rates))
         rank, condition = int(time.kept(cut).sum()), boundary.condition_of(time.singular)
         regression = Regression(rank, len(modes.rates), condition, missed=boundary.missed_ahead(x, time, cut))
+        lookups = how.lift.softer() if how.smooth else []
+        lift = lifted(lookups[len(lookups) // 2] if lookups else how.lift)
         predictor = _predictor(trajectories, how, lift, C, regression)
-        if not self.trust:
-            return predictor
         groups = np.tile(np.arange(len(x) // images), images)
 
-        def predict(part: Futures, x0: FloatArray) -> FloatArray:
-            return replace(predictor, observables=part).predict(x0, steps=horizon)
+        def held(lift: Futures, progress: Progress, scored: int = SCORED) -> Trust:
+            def predict(part: Futures, x0: FloatArray) -> FloatArray:
+                return replace(predictor, observables=part).predict(x0, steps=horizon)
 
-        return replace(predictor, trust=held_back(lift, known, groups, predict, progress))
+            return held_back(lift, known, groups, predict, progress, scored)
+
+        if lookups:
+            scored = COMPARED if self.lookup_steps is None else COMPOSED
+
+            def mean(place: int) -> float:
+                tried = replace(lift, nodes=lift.nodes.looked_up_by(lookups[place]))
+                return float(held(tried, silent, scored).errors.mean())
+
+            lift = lifted(lookups[_lowest(mean, len(lookups), progress)])
+            predictor = replace(predictor, observables=lift)
+        return replace(predictor, trust=held(lift, progress)) if self.trust else predictor
+
+
+def _lowest(value: Callable[[int], float], places: int, progress: Progress) -> int:
+    """The place in a valley where its ``value`` is lowest, from the middle of so many ``places`` downhill."""
+    known: dict[int, float] = {}
+
+    def at(place: int) -> float:
+        if not 0 <= place < places:
+            return math.inf
+        if place not in known:
+            progress(len(known), places)
+            known[place] = value(place)
+        return known[place]
+
+    lowest = places // 2
+    for step in (1, -1):
+        while at(lowest + step) < at(lowest):
+            lowest += step
+    return lowest
 
 
 def whole(name: str, seconds: float, dt: float) -> int:

@@ -11,8 +11,9 @@ from koopcli.records import Meta
 @dataclass(frozen=True)
 class Regression:
     """How many of its ``directions`` the data determine (``rank``), its ``condition`` number, how it was ``solved_by``
-    (as :mod:`koopcli.koopman.edmd.blockwise` and ``product`` name it), and the share of the data in percent that the
-    exponentials do not represent, ``missed``, where there are any.
+    (as :mod:`koopcli.koopman.edmd.blockwise` and ``product`` name it), the share of the data in percent that the
+    exponentials do not represent, ``missed``, where there are any, and the estimated standard deviation of the
+    ``noise`` of each state (n_x,) that was smoothed away, where any was.
     """
 
     rank: int
@@ -20,12 +21,18 @@ class Regression:
     condition: float
     solved_by: str = ""
     missed: float | None = None
+    noise: tuple[float, ...] | None = None
 
     def pack(self) -> Meta:
-        """The facts for storage; an infinite condition is none."""
-        return {**vars(self), "condition": self.condition if math.isfinite(self.condition) else None}
+        """The facts for storage; an infinite condition is none, and noise that was not smoothed is left out."""
+        facts: Meta = {**vars(self), "condition": self.condition if math.isfinite(self.condition) else None}
+        noise = facts.pop("noise")
+        return facts if noise is None else {**facts, "noise": list(noise)}
 
     @classmethod
     def unpack(cls, meta: Meta) -> Regression:
         """The inverse of :meth:`pack`."""
-        return cls(**{**meta, "condition": math.inf if meta["condition"] is None else meta["condition"]})
+        noise = tuple(meta["noise"]) if "noise" in meta else None
+        return cls(
+            **{**meta, "condition": math.inf if meta["condition"] is None else meta["condition"], "noise": noise}
+        )

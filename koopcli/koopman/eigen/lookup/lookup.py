@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, Self
 
 import numpy as np
 
@@ -27,6 +27,12 @@ class Lift(Choice):
     beyond: ClassVar[str]
     neighbours: int = 1
     spacing: int | None = None
+
+    def softer(self) -> list[Self]:
+        """The same lookup at every softness that is tried on noisy nodes, where that is open; none of one that has
+        none.
+        """
+        return []
 
     @property
     def counts_neighbours(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import ClassVar
 
@@ -17,7 +17,8 @@ from koopcli.records import BoolArray, FloatArray, IndexArray
 TOGETHER = 128  # places solved for at once
 STIFF = 1e-9  # softness of a spline that meets its nodes
 LARGEST = 10.0  # sum of absolute weights, beyond which a simpler spline is taken
-SIMPLER = ((1, STIFF), (1, 1e-4), (1, 1e-2))  # degree and softness, one after the other
+SIMPLER = (STIFF, 1e-4, 1e-2)  # softnesses of a linear tail, one after the other
+SOFTER = (STIFF, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1, 3e-1, 1.0)  # tried where nodes are noisy
 
 
 class Polyharmonic:
@@ -29,8 +30,8 @@ class Polyharmonic:
     softer spline, and in the end no more than the trend of its neighbours.
     """
 
-    def __init__(self, nodes: Cloud) -> None:
-        self._nodes = nodes
+    def __init__(self, nodes: Cloud, softness: float = STIFF) -> None:
+        self._nodes, self._softness = nodes, softness
 
     def __call__(self, y: FloatArray) -> tuple[IndexArray, FloatArray]:
         """The neighbours (n, q) of each of ``y`` (n, n_x) and what each of their values counts."""
@@ -40,18 +41,20 @@ class Polyharmonic:
             rows = slice(start, start + TOGETHER)
             way = self._nodes.places[near[rows]] - y[rows, np.newaxis]
             size = np.sqrt((way**2).sum(axis=2).max(axis=1))
-            weights[rows] = _bounded(way / np.maximum(size, np.finfo(float).tiny)[:, np.newaxis, np.newaxis])
+            weights[rows] = _bounded(
+                way / np.maximum(size, np.finfo(float).tiny)[:, np.newaxis, np.newaxis], self._softness
+            )
         return near, weights
 
 
-def _bounded(near: FloatArray) -> FloatArray:
+def _bounded(near: FloatArray, softness: float) -> FloatArray:
     """The weights (n, q), simpler where they would be large."""
-    weights = spline_weights(near, 2, STIFF)
+    weights = spline_weights(near, 2, softness)
     wild = np.flatnonzero(_wild(weights))
-    for degree, softness in SIMPLER:
+    for softer in SIMPLER:
         if not len(wild):
             return weights
-        weights[wild] = spline_weights(near[wild], degree, softness)
+        weights[wild] = spline_weights(near[wild], 1, max(softness, softer))
         wild = wild[_wild(weights[wild])]
     weights[wild] = trend_weights(near[wild])
     return weights
@@ -108,10 +111,21 @@ class PolyharmonicLift(Lift):
     spacing: int | None = setting(
         None, low=1, high=1_000_000, help="samples between neighbours on one trajectory; else any"
     )
+    softness: float | None = setting(
+        None,
+        above=0,
+        high=10,
+        help="how far a spline passes by its nodes, as a share of the farthest one's distance cubed; else it meets "
+        "them, and where noise is smoothed what predicts trajectories held back best is taken",
+    )
 
     def make(self, nodes: Cloud) -> Polyharmonic:
         """The lookup among ``nodes``."""
-        return Polyharmonic(nodes)
+        return Polyharmonic(nodes, STIFF if self.softness is None else self.softness)
+
+    def softer(self) -> list[PolyharmonicLift]:
+        """One for each softness, if that is open."""
+        return [replace(self, softness=softness) for softness in SOFTER] if self.softness is None else []
 
     def fewest(self, states: int) -> int:
         """As many as a quadratic has coefficients."""
