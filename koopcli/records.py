@@ -294,7 +294,83 @@ class Trajectories(Content):
         )
 
 
-def _channels(record: Sample | Trajectories) -> str:
+@dataclass(frozen=True, eq=False, repr=False)
+class Episodes(Content):
+    """What was measured, on one grid: ``x`` (rows, n_x) and ``u`` (rows, n_u) every ``dt`` s, episode after episode.
+
+    ``bounds`` (episodes + 1,): the row that each episode begins at, and where the last one ends; ``starts`` (episodes,):
+    the time in s of its first row; ``runs`` (episodes,): which recording it is from. u_k acts from row k to k + 1; that of
+    the last row of an episode acts beyond it.
+    """
+
+    x: Blocks
+    u: Blocks
+    dt: float
+    bounds: IntArray
+    starts: FloatArray
+    runs: IntArray
+    state_channels: Channels
+    input_channels: Channels
+
+    def __post_init__(self) -> None:
+        lengths = np.diff(self.bounds)
+        fits = self.bounds[0] == 0 and self.bounds[-1] == self.x.shape[0] == self.u.shape[0] and (lengths >= 2).all()
+        if not fits or len(self.starts) != len(lengths) or len(self.runs) != len(lengths):
+            raise InvalidValueError(f"episodes of x {self.x.shape} and u {self.u.shape} do not fit their bounds")
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def __repr__(self) -> str:
+        return f"Episodes: {len(self)}, {self.x.shape[0]} rows every {self.dt:g} s\n{_channels(self)}"
+
+    @property
+    def rows(self) -> int:
+        """Rows of all episodes."""
+        return int(self.x.shape[0])
+
+    @property
+    def lengths(self) -> IntArray:
+        """Rows of each episode, (episodes,)."""
+        return np.diff(self.bounds)
+
+    @property
+    def time(self) -> FloatArray:
+        """The time in s of every row, (rows,)."""
+        within = np.arange(self.rows) - np.repeat(self.bounds[:-1], self.lengths)
+        return np.repeat(self.starts, self.lengths) + self.dt * within
+
+    def pack(self) -> Packed:
+        """The episodes for storage."""
+        arrays = {
+            "x": Array(self.x, ("row", "state"), self.state_channels.unit_text),
+            "u": Array(self.u, ("row", "input"), self.input_channels.unit_text),
+            "bounds": Array(self.bounds, ("bound",), "1"),
+            "starts": Array(self.starts, ("episode",), "s"),
+            "runs": Array(self.runs, ("episode",), "1"),
+        }
+        meta = {
+            "dt": self.dt,
+            "state_channels": self.state_channels.pack(),
+            "input_channels": self.input_channels.pack(),
+        }
+        return Packed(arrays, meta)
+
+    @classmethod
+    def unpack(cls, packed: Packed) -> Episodes:
+        """The inverse of :meth:`pack`; ``x`` and ``u`` stay where they are."""
+        small = {name: packed.arrays[name].values[...] for name in ("bounds", "starts", "runs")}
+        return cls(
+            x=packed.arrays["x"].values,
+            u=packed.arrays["u"].values,
+            dt=packed.meta["dt"],
+            state_channels=Channels.unpack(packed.meta["state_channels"]),
+            input_channels=Channels.unpack(packed.meta["input_channels"]),
+            **small,
+        )
+
+
+def _channels(record: Sample | Trajectories | Episodes) -> str:
     return f"  states {record.state_channels}\n  inputs {record.input_channels}"
 
 

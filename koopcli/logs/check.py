@@ -1,0 +1,36 @@
+"""What was looked at in a log, and what came of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from koopcli.records import Meta
+
+Verdict = Literal["ok", "note", "warn", "ask"]
+
+
+@dataclass(frozen=True)
+class Check:
+    """One look at a log: its ``name`` is a fixed word, beside it the ``signal`` that it is about, if it is about one.
+
+    ``value`` in ``unit``, which is ``healthy`` within the range said in words; ``hint``: what mends it, empty where
+    nothing has to be.
+    """
+
+    name: str
+    value: float
+    unit: str
+    healthy: str
+    verdict: Verdict
+    hint: str = ""
+    signal: str = ""
+
+    def pack(self) -> Meta:
+        """The check as JSON."""
+        return dict(vars(self))
+
+    @classmethod
+    def unpack(cls, meta: Meta) -> Check:
+        """The inverse of :meth:`pack`."""
+        return cls(**meta)
