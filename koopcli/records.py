@@ -298,9 +298,9 @@ class Trajectories(Content):
 class Episodes(Content):
     """What was measured, on one grid: ``x`` (rows, n_x) and ``u`` (rows, n_u) every ``dt`` s, episode after episode.
 
-    ``bounds`` (episodes + 1,): the row that each episode begins at, and where the last one ends; ``starts`` (episodes,):
-    the time in s of its first row; ``runs`` (episodes,): which recording it is from. u_k acts from row k to k + 1; that of
-    the last row of an episode acts beyond it.
+    ``bounds`` (episodes + 1,): the row that each episode begins at, and where the last one ends; ``starts``
+    (episodes,): the time in s of its first row; ``runs`` (episodes,): which recording it is from. u_k acts from row k
+    to k + 1; that of the last row of an episode acts beyond it.
     """
 
     x: Blocks
