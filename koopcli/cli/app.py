@@ -10,7 +10,7 @@ import typer
 import koopcli
 from koopcli.cli.lazy import Entry, group_of
 
-REPRODUCE, MAKE, LOOK = "Reproduce", "Make", "Look into the store and after it"
+REPRODUCE, OWN, MAKE, LOOK = "Reproduce", "Your own log", "Make", "Look into the store and after it"
 COMMANDS = (
     Entry(
         "reproduce",
@@ -19,6 +19,9 @@ COMMANDS = (
         "Reproduce the paper at full size and put its numbers beside those found here: EDMD over orders, training "
         "grids and test inputs; eigenfunctions over readings of the text, two tyres, cuts, grip and baselines.",
     ),
+    Entry("import", "importing", OWN, "Bring in a log of your own car, with checks of its units, signs and clocks."),
+    Entry("select", "selecting", OWN, "Choose a predictor of a log and say whether it is worth having."),
+    Entry("predict", "predicting", OWN, "Predict from a state of a log, or from one that is given."),
     Entry("sample", "making", MAKE, "Draw or lay out initial states and inputs."),
     Entry("simulate", "making", MAKE, "Simulate trajectories of a vehicle from a sample."),
     Entry(

@@ -27,6 +27,7 @@ from koopcli.config.declared import KINDS
 from koopcli.config.experiment import Experiment
 from koopcli.config.settings import Evaluate
 from koopcli.console import Console, show_table
+from koopcli.errors import UsageError
 
 if TYPE_CHECKING:
     from koopcli.stages.base import Task
@@ -78,7 +79,16 @@ def evaluate(
 
     of = call.optional(predictor, tuple(fits.FITS), "the PREDICTOR", TEST)
     elsewhere = [section for section in call.changes if section != "test"]
-    test = call.optional(on, ["simulate"], "--on", elsewhere)
+    test = call.optional(on, ["simulate", "import"], "--on", elsewhere)
+    log = test if test is not None else None if of is None else of.find("import")
+    if log is not None and log.stage == "import":
+        if of is None:
+            raise UsageError("name the predictor to score on this log: koop evaluate PREDICTOR --on import/…")
+        from koopcli.stages.measured import scored as on_log
+
+        task = on_log(of, log)
+        call.run(lambda experiment: task, as_json=as_json, dry_run=dry_run, extra=_show_states)
+        return
 
     def evaluation(experiment: Experiment) -> Task:
         on = recipes.test_set(experiment, call.simulated(of)) if of is not None and test is None else test
@@ -94,6 +104,17 @@ def evaluate(
         extra=lambda artefact: _judge(call, typed, task, artefact, others),
         also=list(others.values()),
     )
+
+
+def _show_states(artefact: Artefact) -> None:
+    """The errors of every state, beside hold and DMD with control, on stderr."""
+    channels = artefact.content.state_channels
+    rows = [
+        [name, unit, f"{horizon} s", f"{about['rmse']:.3g}", f"{about['to_hold']:.2f}", f"{about['to_dmdc']:.2f}"]
+        for name, unit in zip(channels.names, channels.units, strict=True)
+        for horizon, about in artefact.figures["per_state"][name].items()
+    ]
+    show_table(["state", "unit", "ahead", "RMSE", "× hold", "× DMDc"], rows, left=2, file=sys.stderr)
 
 
 def _judge(call: Invocation, typed: Typed, task: Task, artefact: Artefact, others: dict[str, Task]) -> dict[str, Any]:

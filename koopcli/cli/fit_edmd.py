@@ -66,7 +66,7 @@ def fit_edmd(
     )
     from koopcli.stages import recipes
 
-    of = [call.named(name, ["simulate"], "the TRAJECTORIES", ("fit-edmd",)) for name in trajectories or []]
+    of = [call.named(name, ["simulate", "import"], "the TRAJECTORIES", ("fit-edmd",)) for name in trajectories or []]
     call.run(lambda experiment: recipes.fit_edmd(experiment, *of), as_json=as_json, dry_run=dry_run)
 
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from koopcli.stages.pipeline import Artefact, Pipeline, Step
 
 
+BRIEF = 40  # letters of a setting in one line: longer ones are digests, and the maps of logs
 DATA = ("sample", "vehicle", "simulate")  # the sections behind trajectories
 
 
@@ -208,9 +209,9 @@ def show_plan(steps: Sequence[Step], *, as_json: bool) -> None:
 
 
 def brief(settings: dict[str, Any]) -> str:
-    """Settings in one short text, without nested ones, and without digests that nobody sets."""
+    """Settings in one short text, without nested ones, and without digests and maps."""
     plain = {key: value for key, value in settings.items() if not isinstance(value, (dict, list, tuple))}
-    return " ".join(f"{key}={value}" for key, value in plain.items() if key != "drawn_by")
+    return " ".join(f"{key}={value}" for key, value in plain.items() if len(str(value)) <= BRIEF)
 
 
 def _shown(cell: Any) -> Any:

@@ -138,6 +138,12 @@ class Experiment:
         layers = [source.section(section) for source in self.sources]
         return build_layers(DECLARED[section], [*layers, Layer(chosen)], f"{section}.")
 
+    @property
+    def measured_fit(self) -> FitEdmd:
+        """How a log is fitted: by the states and their past, but for what the command line changes."""
+        usual = Layer({"basis": "total", "order": 1})
+        return build_layers(FitEdmd, [usual, self.sources[-1].section("fit-edmd")], "fit-edmd.")
+
     def given(self, name: str) -> object:
         """The raw value that the command line gives a setting by its full ``name``."""
         return dict(flat(self.sources[-1].values))[name]

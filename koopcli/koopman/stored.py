@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from koopcli.koopman.bases import STORED
+from koopcli.koopman.bases import STORED, WITH_MEMORY
 from koopcli.koopman.eigen.futures import Futures
 from koopcli.koopman.eigen.tabulated import Tabulated
 from koopcli.koopman.predictor.dynamics import Dynamics
@@ -28,7 +28,7 @@ def _of_modes(unpack: Callable[[Packed, Modes], Observables]) -> UnpackLift:
 
 
 LIFTS: dict[str, UnpackLift] = {
-    **{kind: _of_basis(unpack) for kind, unpack in STORED.items()},
+    **{kind: _of_basis(unpack) for kind, unpack in (STORED | WITH_MEMORY).items()},
     **{table.kind: _of_modes(table.unpack) for table in (Tabulated, Futures)},
 }
 

@@ -18,6 +18,7 @@ from koopcli.stages.base import Task
 from koopcli.stages.naming import names, points
 from koopcli.stages.subject import of_vehicles, subject
 
+OF_LOGS = {"import": "log", "select": "selection", "score": "score"}  # stages, and what a figure calls what they make
 TOLD_BESIDE = ("test", "plot")  # sections that matter beside a named predictor
 
 
@@ -36,6 +37,10 @@ def artefacts(name: str, experiment: Experiment) -> list[Task]:
         return kind.makes(recipes, experiment)
     if kind.takes == "nothing":
         return []
+    if kind.takes in OF_LOGS.values():
+        raise InvalidValueError(
+            f"the figure '{name}' draws a {kind.takes} of your own data, which koop cannot make: name it"
+        )
     if kind.takes == "sweep":
         return [grid.order_grid(experiment)]
     predictor = recipes.predictor(experiment, kind.usual or kind.only or "fit-edmd")
@@ -136,6 +141,8 @@ def _behind(task: Task, role: str, experiment: Experiment, simulated: Callable[[
     """An artefact itself, what it was made from, or the test trajectory that is made for a predictor."""
     if role == "training":
         return (task.input("predictor") if task.stage == "evaluate" else task).input("trajectories")
+    if task.stage in OF_LOGS:
+        return task if role == OF_LOGS[task.stage] else task.input(role)
     if task.stage == "simulate":
         return task
     if task.stage == "evaluate":

@@ -20,9 +20,11 @@ from koopcli.koopman.edmd.survey import Survey, survey
 from koopcli.koopman.edmd.transitions import Transitions
 from koopcli.koopman.predictor.coverage import coverage_of
 from koopcli.koopman.predictor.predictor import Predictor
+from koopcli.logs.imported import Log
 from koopcli.progress import Progress
 from koopcli.records import Meta, Packed
 from koopcli.simulation.samples.grid import GridSample
+from koopcli.stages import logs
 from koopcli.stages.base import Context, Cost, Inputs, Outlook, Stage, Task
 from koopcli.stages.predictors import figures, regression, size
 from koopcli.stages.roles import finished, roles_of
@@ -32,10 +34,14 @@ from koopcli.vehicles.plants.plant import PlantChoice
 
 TERMS_LIMIT = 4096  # coefficients of one lifted state
 HARMLESS = 1e14  # a condition number that leaves two digits
+UNKNOWN_DT = 0.04  # s, of a log that tells it itself
 OF_ONE_RUN = ("steps", "chunk", "reference")  # settings of a simulation that make it no other plant
 
 
 def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
+    measured = [inputs[role].episodes for role in roles_of(inputs) if isinstance(inputs[role], Log)]
+    if measured:
+        return _say_still(edmd.fit_measured(measured, settings, context.progress), context)
     data = Transitions.of([finished(inputs[role], context) for role in roles_of(inputs)])
 
     def over(work: Pass) -> Iterator[Found]:
@@ -58,12 +64,17 @@ def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
             f"the normal equations of raw monomials have condition {regression.condition:.1e}, squared: what this "
             "predictor shows is rounding as much as the method; use the solver 'orthonormal'"
         )
+    return _say_still(predictor, context)
+
+
+def _say_still(predictor: Predictor, context: Context) -> Predictor:
+    """Warn of inputs that a predictor knows nothing of."""
     acting = predictor.dynamics.acting
     still = [name for name, acts in zip(predictor.input_channels.names, acting, strict=True) if not acts]
     if still:
         context.warn(
             f"{', '.join(still)} never moved in these data, so B is zero there: the predictor knows nothing of it; "
-            "sample inputs that move (sample.levels)"
+            + ("record some in which it moves" if not predictor.plant else "sample inputs that move (sample.levels)")
         )
     return predictor
 
@@ -86,22 +97,34 @@ def _warn_of_centres(basis: Basis, seen: Survey, context: Context) -> None:
 
 
 def _functions(task: Task) -> int:
-    return int(task.settings.basis.functions(len(_plant(task).states)))
+    states, inputs, dt = _channels(task)
+    memory = task.settings.memory
+    if memory is None:
+        memory = edmd.MEMORY if _measured(task) else 0.0
+    return int(task.settings.basis.functions(states)) + int(memory / dt + 0.5) * (states + inputs)
 
 
 def _terms(task: Task) -> int:
     """Coefficients of each lifted state."""
-    return int(task.settings.terms.count(_functions(task), len(_plant(task).inputs)))
+    return int(task.settings.terms.count(_functions(task), _channels(task)[1]))
 
 
-def _plant(task: Task) -> PlantChoice | type[PlantChoice]:
-    simulation = task.find("simulate")
-    return simulation.settings.plant if simulation is not None else Forces
+def _channels(task: Task) -> tuple[int, int, float]:
+    """The number of states and of inputs of the data, and their sampling period in s as far as it is known."""
+    log, simulation = task.find(logs.STAGE_NAME), task.find("simulate")
+    if log is not None:
+        return (*logs.channels(log), log.settings.dt or UNKNOWN_DT)
+    plant: PlantChoice | type[PlantChoice] = simulation.settings.plant if simulation is not None else Forces
+    return len(plant.states), len(plant.inputs), simulation.settings.dt if simulation is not None else UNKNOWN_DT
+
+
+def _measured(task: Task) -> bool:
+    return task.find(logs.STAGE_NAME) is not None
 
 
 def _outlook(task: Task) -> Outlook:
     settings, sample = task.settings, task.find("sample")
-    about = "other data"
+    about = "a log" if _measured(task) else "other data"
     if sample is not None:
         about = sample.settings.label
     name = settings.terms.label.format(settings.basis.name)
@@ -135,6 +158,9 @@ def _check(task: Task) -> None:
             "use 'total'"
         )
     data = [task.input(role) for role in roles_of(dict(task.inputs))]
+    if _measured(task):
+        edmd.check_increments(settings)
+        return
     _check_alike(data)
     if not settings.basis.of_states:
         _check_samples(task, data)
@@ -173,7 +199,7 @@ def _check_samples(task: Task, data: list[Task]) -> None:
     if all(start is not None for start in starts):
         runs = zip(starts, data, strict=True)
         samples = sum(start.settings.trajectories * run.settings.steps for start, run in runs if start is not None)
-        inputs = len(_plant(task).inputs)
+        inputs = _channels(task)[1]
         edmd.check_samples(samples, _functions(task), inputs, task.settings.terms)
 
 
@@ -197,6 +223,8 @@ def _check_grid(task: Task, grid: GridSample) -> None:
 def is_product(settings: FitEdmd, data: Sequence[Task]) -> bool:
     """Whether the fit averages over the inputs of a product of states with inputs, which is read at once."""
     sample = data[0].find("sample")
+    if settings.by_increments:
+        return False
     grid = sample is not None and isinstance(sample.settings, GridSample) and data[0].settings.steps == 1
     grid = grid and not data[0].settings.noise
     return grid and len(data) == 1 and not settings.plain and settings.basis.makes.constant is not None
@@ -204,6 +232,8 @@ def is_product(settings: FitEdmd, data: Sequence[Task]) -> bool:
 
 def _estimate(task: Task) -> Cost:
     N, terms = _functions(task), _terms(task)
+    if _measured(task):
+        return Cost(0.3, 8.0 * N * terms)
     data = [task.input(role) for role in roles_of(dict(task.inputs))]
     samples = sum(run.ancestor("sample").settings.trajectories * run.settings.steps for run in data)
     sample = data[0].ancestor("sample").settings

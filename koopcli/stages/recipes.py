@@ -42,7 +42,7 @@ def simulation(experiment: Experiment, of: Task | None = None, plant: str = "for
 def fit_edmd(experiment: Experiment, *of: Task) -> Task:
     """The EDMD predictor, from the experiment's training set or the trajectories given."""
     trajectories = of or (simulation(experiment, plant="forces"),)
-    fit = experiment.fit_edmd
+    fit = experiment.fit_edmd if trajectories[0].stage == "simulate" else experiment.measured_fit
     if is_product(fit, trajectories):
         fit = fit.but(chunk=FitEdmd.chunk)  # which has no effect
     return Task("fit-edmd", fit, as_inputs(trajectories))

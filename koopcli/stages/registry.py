@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from koopcli.stages import evaluate, plot, sample, simulate, sweep
+from koopcli.stages import evaluate, logs, plot, predict, sample, score, select, simulate, sweep
 from koopcli.stages.base import Stage
 from koopcli.stages.fits import FITS
 
 STAGES: dict[str, Stage] = {
     stage.name: stage
-    for stage in (sample.STAGE, simulate.STAGE, *FITS.values(), evaluate.STAGE, sweep.STAGE, plot.STAGE)
+    for stage in (
+        *(sample.STAGE, simulate.STAGE, logs.STAGE, *FITS.values()),
+        *(evaluate.STAGE, select.STAGE, score.STAGE, predict.STAGE, sweep.STAGE, plot.STAGE),
+    )
 }

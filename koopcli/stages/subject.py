@@ -38,6 +38,8 @@ def _simulations(
     simulations = [step.settings for step in steps if step.stage == "simulate"]
     if not simulations:
         for predictor in predictors:
+            if predictor.find("import") is not None:  # of a car that was measured
+                continue
             try:
                 simulations.append(simulated(predictor))
             except UnknownNameError:  # its record is gone too

@@ -23,7 +23,9 @@ from koopcli.records import Array, BoolArray, Channels, FloatArray, Packed
 LOST = " (all diverged)"  # after the name of one among several that has no error to draw
 Recipes = Any  # the module koopcli.stages.recipes, which is handed over: figures stand below the stages
 Task = Any  # of koopcli.stages.base, for the same reason
-Takes = Literal["evaluation", "predictor", "fit", "sample", "trajectories", "sweep", "nothing"]
+Takes = Literal[
+    "evaluation", "predictor", "fit", "sample", "trajectories", "sweep", "log", "selection", "score", "nothing"
+]
 TAKES: dict[Takes, tuple[str, ...]] = {
     "evaluation": ("evaluate",),
     "predictor": (*get_args(FitName), "baseline"),
@@ -31,6 +33,9 @@ TAKES: dict[Takes, tuple[str, ...]] = {
     "sample": ("sample",),
     "trajectories": ("simulate",),
     "sweep": ("sweep",),
+    "log": ("import",),
+    "selection": ("select",),
+    "score": ("score",),
     "nothing": (),
 }  # the stages that make what a figure takes
 

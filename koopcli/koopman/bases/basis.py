@@ -6,20 +6,12 @@ from typing import Any, ClassVar, Protocol
 
 from koopcli.choices import Choice
 from koopcli.koopman.bases.moments import Products
-from koopcli.koopman.predictor.lifts import Observables
+from koopcli.koopman.predictor.lifts import Explicit
 from koopcli.records import FloatArray
 
 
-class Basis(Observables, Protocol):
+class Basis(Explicit, Protocol):
     """A lift by explicit functions of the state, which EDMD can fit."""
-
-    @property
-    def constant(self) -> int | None:
-        """Index of the observable that is one everywhere, if there is one."""
-
-    @property
-    def state_map(self) -> FloatArray:
-        """C (n_x, N) with x = C ψ(x) exactly: every basis holds the states themselves."""
 
     def lift_rows(self, x: FloatArray, out: FloatArray) -> None:
         """ψ(x) of the states (n, n_x) as rows into ``out`` (N, n), which is contiguous."""

@@ -51,7 +51,7 @@ class Look:
         for x, u, _ in data.blocks(READ, span):
             first, last = np.searchsorted(chosen, [start, start + len(x)])
             states.append(x[chosen[first:last] - start])
-            corners = corners_of(x if corners is None else np.concatenate([corners, x]))
+            corners = corners_of(x if corners is None else np.concatenate([corners, x]), data.hull_states)
             triangle, ends = add_inputs(triangle, u), _ends(ends, u)
             start += len(x)
             progress(start - span.start, span.stop - span.start)
@@ -78,7 +78,7 @@ def survey(data: Transitions, over: Over) -> Survey:
     parts = list(over(Look()))
     corners = parts[0]["corners"]
     for part in parts[1:]:
-        corners = corners_of(np.concatenate([corners, part["corners"]]))
+        corners = corners_of(np.concatenate([corners, part["corners"]]), data.hull_states)
     triangle = parts[0]["triangle"]
     for part in parts[1:]:
         triangle = add_rows(triangle, part["triangle"])

@@ -18,6 +18,8 @@ class Terms(Choice):
     """Which terms: with ``products`` u_i N_i z or without. ``needs_constant``: among the observables."""
 
     products: ClassVar[bool] = False
+    of_states: ClassVar[bool] = False
+    """Whether the products are with the present states alone, not with all that is lifted."""
     needs_constant: ClassVar[bool] = False
     rolled: ClassVar[int]
     """About how many products with every matrix a step takes, beside that with A."""
@@ -53,6 +55,23 @@ class BilinearTerms(Terms):
     products = True
     rolled = 1
     label = "bilinear {}"
+
+    def dynamics(self, operators: Operators, constant: int | None, dt: float) -> Dynamics:
+        """z⁺ = A z + B u + Σ u_i N_i z."""
+        assert operators.N is not None, "fitted with products"
+        return Bilinear(operators.A, operators.B, operators.N)
+
+
+@dataclass(frozen=True)
+class ProductTerms(Terms):
+    """B u and products of the inputs with the present states alone, as measured data ask for."""
+
+    kind: ClassVar[str] = "products"
+    products = True
+    of_states = True
+    needs_constant = True
+    rolled = 1
+    label = "{}, products"
 
     def dynamics(self, operators: Operators, constant: int | None, dt: float) -> Dynamics:
         """z⁺ = A z + B u + Σ u_i N_i z."""

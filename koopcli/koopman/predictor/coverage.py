@@ -15,6 +15,8 @@ STATES_LIMIT = 1 << 16  # training states that are kept to measure distances fro
 DIRECTIONS = 256
 GOLDEN = (5**0.5 - 1) / 2
 ROUNDING = 1e-9  # of a half-width: a state on the hull is inside it
+HULL_STATES = 5  # the most states whose convex hull is found: of six it takes seconds, of eight it does not end
+MEASURED_STATES = 4  # of many measured states, whose hull has more corners
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -22,7 +24,7 @@ class Coverage(Content):
     """``states`` (m, n_x) a spread choice of training states, ``domain`` (2, n_x) the smallest and largest of all.
 
     ``facets`` (f, n_x + 1) the convex hull of all of them in half-widths of the domain (its box, where they lie in a
-    plane): inside where facet · [x, 1] ≤ 0.
+    plane or have too many states for a hull): inside where facet · [x, 1] ≤ 0.
     """
 
     states: FloatArray
@@ -60,17 +62,17 @@ class Coverage(Content):
         return cKDTree(_in_half_widths(self.states, self.domain))
 
 
-def coverage_of(states: FloatArray, corners: FloatArray | None = None) -> Coverage:
+def coverage_of(states: FloatArray, corners: FloatArray | None = None, most: int = HULL_STATES) -> Coverage:
     """The coverage of the training ``states`` (m, n_x), or of more that their hull and box hang on at ``corners``.
 
     ``STATES_LIMIT`` of them at most, spread evenly, are kept to measure distances from. States that lie in a plane have
-    no hull; the box of the domain stands for it.
+    no hull, and of more than ``most`` states none is looked for; the box of the domain stands for it.
     """
     if corners is None:
-        corners = corners_of(states)
+        corners = corners_of(states, most)
     domain = np.stack([corners.min(axis=0), corners.max(axis=0)])
     n_x = corners.shape[1]
-    hull = _hull(_in_half_widths(corners, domain))
+    hull = _hull(_in_half_widths(corners, domain)) if n_x <= most else None
     box = np.hstack([np.vstack([np.eye(n_x), -np.eye(n_x)]), -np.ones((2 * n_x, 1))])
     facets = box if hull is None else np.unique(hull.equations, axis=0)
     return Coverage(states[spread(len(states), STATES_LIMIT)], domain, facets)
@@ -83,8 +85,13 @@ def spread(total: int, limit: int) -> IndexArray:
     return np.unique((np.arange(limit) * GOLDEN % 1.0 * total).astype(np.intp))
 
 
-def corners_of(x: FloatArray) -> FloatArray:
-    """The states that the hull and the box of ``x`` hang on; of a grid or a plane all, or the corners if too many."""
+def corners_of(x: FloatArray, most: int = HULL_STATES) -> FloatArray:
+    """The states that the hull and the box of ``x`` hang on; of a grid or a plane all, or the corners if too many.
+
+    Of more than ``most`` states those of the box alone.
+    """
+    if x.shape[1] > most:
+        return np.asarray(x[np.unique(np.concatenate([x.argmin(axis=0), x.argmax(axis=0)]))])
     hull = _hull(x)
     if hull is None and len(x) <= STATES_LIMIT:
         return x

@@ -28,3 +28,15 @@ class Observables(Protocol):
 
     def pack(self) -> Packed:
         """The lift as arrays, with its kind."""
+
+
+class Explicit(Observables, Protocol):
+    """A lift by explicit functions of the state, the states themselves among them."""
+
+    @property
+    def constant(self) -> int | None:
+        """Index of the observable that is one everywhere, if there is one."""
+
+    @property
+    def state_map(self) -> FloatArray:
+        """C (n_x, N) with x = C ψ(x) exactly."""

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -118,3 +120,21 @@ def test_the_overlap_of_the_largest():
     values[5:] = np.nan
     assert overlap_of_largest(values, -others) == 0.0  # never fewer than one
     assert np.isnan(overlap_of_largest(np.full(3, np.nan), np.arange(3.0)))
+
+
+def test_many_states_have_a_box_at_once():
+    """Eight states, whose hull does not end: the box, and the distance as it is; four still have a hull."""
+    rng = np.random.default_rng(7)
+    states = rng.standard_normal((20_000, 8)) * 10.0 ** np.arange(-4, 4)
+    before = time.perf_counter()
+    coverage = coverage_of(states)
+    assert time.perf_counter() - before < 1.0
+    lower, upper = states.min(axis=0), states.max(axis=0)
+    assert (coverage.domain == [lower, upper]).all()
+    x = rng.standard_normal((500, 8)) * 4 * 10.0 ** np.arange(-4, 4)
+    assert (coverage.outside(x) == ((x < lower) | (x > upper)).any(axis=1)).all()
+    assert not coverage.outside(states).any()
+    assert coverage.distance(states[:50]) == pytest.approx(np.zeros(50), abs=1e-12)
+    assert len(merged(states[:10_000], states[10_000:])) <= 16
+    assert len(coverage_of(states[:50, :4]).facets) > 8
+    assert len(coverage_of(states[:50, :5], most=4).facets) == 10
