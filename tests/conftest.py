@@ -32,6 +32,7 @@ from tests import stock
 settings.register_profile("any load", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any load")
 
+OF_LOGS = {"import", "select", "predict"}  # commands that take no experiment
 TINY = """
 [sample.grid]
 count = 5
@@ -106,7 +107,7 @@ def koop(folder, capsys):
     """Run the command line here; `tiny=True` uses the tiny experiment."""
 
     def run(*args: str, tiny: bool = True) -> Result:
-        making = args and args[0] in (*STAGES, "sweep", "reproduce")
+        making = args and args[0] in {*STAGES, "sweep", "reproduce"} - OF_LOGS
         extra = ["--experiment", "../tiny.toml"] if tiny and making else []
         capsys.readouterr()
         code = main([*args, *extra])

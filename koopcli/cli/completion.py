@@ -13,7 +13,10 @@ from koopcli.config.data import data_folder
 from koopcli.errors import KoopError
 from koopcli.figures import NAMES, module_of
 
-STAGES = ("sample", "simulate", "fit-edmd", "fit-eigen", "baseline", "evaluate", "sweep", "plot")  # heavy to ask for
+STAGES = (
+    *("sample", "simulate", "import", "fit-edmd", "fit-eigen", "baseline"),
+    *("evaluate", "select", "score", "predict", "sweep", "plot"),
+)  # heavy to ask for
 
 
 def complete_name(ctx: typer.Context, incomplete: str) -> list[str]:

@@ -87,7 +87,12 @@ def evaluate(
         from koopcli.stages.measured import scored as on_log
 
         task = on_log(of, log)
-        call.run(lambda experiment: task, as_json=as_json, dry_run=dry_run, extra=_show_states)
+        call.run(
+            lambda experiment: task,
+            as_json=as_json,
+            dry_run=dry_run,
+            extra=lambda artefact: _show_states(call.console, artefact),
+        )
         return
 
     def evaluation(experiment: Experiment) -> Task:
@@ -106,8 +111,13 @@ def evaluate(
     )
 
 
-def _show_states(artefact: Artefact) -> None:
+def _show_states(console: Console, artefact: Artefact) -> None:
     """The errors of every state, beside hold and DMD with control, on stderr."""
+    if artefact.content.own:
+        console.warn(
+            "the predictor was fitted to this log, so these errors flatter it: those on rows that no fit saw are told "
+            "by koop select"
+        )
     channels = artefact.content.state_channels
     rows = [
         [name, unit, f"{horizon} s", f"{about['rmse']:.3g}", f"{about['to_hold']:.2f}", f"{about['to_dmdc']:.2f}"]

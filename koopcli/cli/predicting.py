@@ -52,28 +52,28 @@ def predict(
     Example: koop predict fit-edmd/3f2a --from import/51c0 --at 12.3 --csv -
     """
     check_outputs(None, csv_, as_json=as_json)
-    if (from_ is None) == (x0 is None):
-        raise UsageError("say where to start: --from LOG --at S, or --x0 X,Y,…")
-    if from_ is not None and (at is None or inputs is not None):
-        raise UsageError("--from LOG goes with --at S, and takes the inputs of the log, not --inputs")
     call = begin(store, "paper", None, (), {})
     from koopcli.checks import build
     from koopcli.stages import fits, measured
     from koopcli.stages.predict import Predict
 
+    log = call.optional(from_, ["import"], "--from", ())
     of = call.named(predictor, tuple(fits.LIFTED), "the PREDICTOR", ())
+    if (log is None) == (x0 is None):
+        raise UsageError("say where to start: --from LOG --at S, or --x0 X,Y,…")
+    if log is not None and (at is None or inputs is not None):
+        raise UsageError("--from LOG goes with --at S, and takes the inputs of the log, not --inputs")
     values: dict[str, Any] = {"run": run}
-    if from_ is not None:
+    if x0 is None:
         values["at"] = at
     else:
-        values["x0"] = _numbers(x0 or "")
+        values["x0"] = _numbers(x0)
     if inputs is not None:
         content = call.pipeline.make(of).content
         rows = _rows(inputs, content.input_channels.names)
         values |= {"u": rows, "seconds": len(rows) * content.dt}
     if seconds is not None:
         values["seconds"] = seconds
-    log = None if from_ is None else call.named(from_, ["import"], "--from", ())
     task = measured.prediction(of, build(Predict, values), log)
 
     def export(artefact: Artefact) -> None:

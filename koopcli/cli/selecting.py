@@ -74,6 +74,8 @@ def select(
         predictor = call.pipeline.make(measured.chosen(log, selection))
         if not as_json:
             _show(selection)
+        if settings.bicycle and "bicycle" not in selection.models:
+            call.console.note("no bicycle beside it: that needs the signals v_x, yaw_rate and steer")
         call.console.note(f"the predictor: {predictor.record.name}")
         if report is not None:
             from koopcli.reproduction.verdict import write_verdict

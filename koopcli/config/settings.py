@@ -92,8 +92,8 @@ class Evaluate:
     chunk: int = setting(2048, low=1, high=100_000_000, help="trajectories for each committed part")
     relift: bool | None = setting(
         None,
-        help="also score predictions that are lifted afresh at every step; else where a lift takes one lookup: with "
-        "several it takes minutes",
+        help="also score predictions that are lifted afresh at every step; else where a lift takes one lookup and no "
+        "memory: with several it takes minutes",
     )
     restart: int | None = setting(
         None,

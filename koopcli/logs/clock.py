@@ -91,6 +91,8 @@ def mended(time: FloatArray, where: Callable[[int], str]) -> Clock:
         raise InvalidValueError(
             f"{where(back)}: time goes back by {-steps.min():.6g} s: it must rise, split the file or map another time"
         )
+    if not len(steps):
+        raise InvalidValueError(f"{where(int(rows[0]))} is the only row with a time: more were expected")
     if not (steps > 0).any():
         raise InvalidValueError(f"{where(0)}: time never moves over {len(rows)} rows: map another time")
     last = np.append(steps > 0, True)

@@ -8,9 +8,9 @@ from koopcli.records import BoolArray, FloatArray
 
 
 def causal_mean(values: FloatArray, samples: int, restarts: BoolArray) -> FloatArray:
-    """The mean of each of ``values`` (n,) and of at most ``samples`` - 1 before it, back to the last restart.
+    """The mean of each of ``values`` (n,) and of the ``samples`` - 1 before it; not a number where a restart is nearer.
 
-    ``restarts`` (n,): where a silence lies before a sample.
+    ``restarts`` (n,): where a silence lies before a sample. A mean of fewer would be another filter.
     """
     if samples == 1:
         return values
@@ -18,8 +18,8 @@ def causal_mean(values: FloatArray, samples: int, restarts: BoolArray) -> FloatA
     begun = np.maximum.accumulate(np.where(restarts, place, 0))
     total = values.copy()
     for back in range(1, samples):
-        total[back:] += np.where(place[back:] - back >= begun[back:], values[:-back], 0.0)
-    return np.asarray(total / np.minimum(place - begun + 1, samples))
+        total[back:] += values[:-back]
+    return np.asarray(np.where(place - begun >= samples - 1, total / samples, np.nan))
 
 
 def heading_rate(time: FloatArray, heading: FloatArray, width: float, restarts: BoolArray) -> FloatArray:

@@ -60,11 +60,11 @@ def gridded(channels: dict[str, Channel], log_map: LogMap, dt: float) -> Gridded
         kept &= _holds(condition, grid, channels, log_map, dt)
     least = max(2, int(np.ceil(log_map.shortest / dt - 1e-6)) + 1)
     slices, short = stretches(kept, least)
-    rows = np.concatenate([np.arange(part.start, part.stop) for part in slices]) if slices else np.empty(0, dtype=int)
-    x, u = _values(grid, rows, channels, log_map, dt)
+    x, u = _values(grid, slices, channels, log_map, dt)
+    flagged = np.concatenate([flagged[part] for part in slices]) if slices else flagged[:0]
     lengths = [part.stop - part.start for part in slices]
     starts = [float(grid[part.start]) for part in slices]
-    return Gridded(x, u, flagged[rows], lengths, starts, short, len(grid), silent)
+    return Gridded(x, u, flagged, lengths, starts, short, len(grid), silent)
 
 
 def roles(log_map: LogMap) -> tuple[list[Signal], list[Signal]]:
@@ -75,11 +75,12 @@ def roles(log_map: LogMap) -> tuple[list[Signal], list[Signal]]:
 
 
 def _values(
-    grid: FloatArray, rows: np.ndarray, channels: dict[str, Channel], log_map: LogMap, dt: float
+    grid: FloatArray, slices: list[slice], channels: dict[str, Channel], log_map: LogMap, dt: float
 ) -> tuple[FloatArray, FloatArray]:
     states, inputs = roles(log_map)
-    x, u = np.empty((len(rows), len(states))), np.empty((len(rows), len(inputs)))
-    if not len(rows):
+    rows = sum(part.stop - part.start for part in slices)
+    x, u = np.empty((rows, len(states))), np.empty((rows, len(inputs)))
+    if not rows:
         return x, u
     needed = {"v_x", "yaw_rate"} if any(s.result == "v_y" for s in log_map.signals) else set()
     ordered = [*((x, i, signal, False) for i, signal in enumerate(states))]
@@ -92,7 +93,10 @@ def _values(
             on_grid = interpolated(grid, channel)
         else:
             on_grid = held_mean(grid, channel, dt) if signal.hold == "mean" else held_last(grid, channel, dt)
-        values[:, column] = on_grid[rows]
+        first = 0
+        for part in slices:
+            values[first : first + part.stop - part.start, column] = on_grid[part]
+            first += part.stop - part.start
         if signal.name not in needed:
             del channels[signal.name]
     return x, u

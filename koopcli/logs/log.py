@@ -16,6 +16,7 @@ from koopcli.logs.plausible import checks_of
 from koopcli.logs.recording import Recording, recording_of, units_of
 from koopcli.logs.resample import sensible_step
 from koopcli.logs.timing import time_checks
+from koopcli.logs.units import known, unit
 from koopcli.progress import Progress, silent
 from koopcli.records import Channels, Episodes, FloatArray
 
@@ -179,9 +180,11 @@ def _notes(
             notes.append(f"run {Path(run.name).name or run.name} has no episode")
     untimed = sum(clock.untimed for recording in recordings for clock in recording.clocks.values())
     if untimed:
-        notes.append(f"{untimed} rows without a time left out")
+        notes.append(f"{untimed} row{'s' * (untimed > 1)} without a time left out")
     for signal in log_map.signals:
-        measured = recordings[0].heard[signal.name].unit
+        measured, said = recordings[0].heard[signal.name].unit, recordings[0].heard[signal.name].said
+        if signal.unit is not None and known(said) and unit(said) != measured:
+            notes.append(f"{signal.name} taken in {measured.name}, as the map says; its file says {said}")
         if signal.unit is None and measured.name not in ("1", measured.si):
             notes.append(f"{signal.name} taken in {measured.name}, as its file says")
     return notes

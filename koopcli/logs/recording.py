@@ -25,14 +25,15 @@ from koopcli.records import FloatArray
 class Heard:
     """What is known of one signal in one run, but for its channel.
 
-    ``digest`` of its raw values, ``low`` and ``high`` of them (nan where none is a number), ``unit`` they are in, and
-    ``place``: file and column, for errors.
+    ``digest`` of its raw values, ``low`` and ``high`` of them (nan where none is a number), ``unit`` they are in,
+    ``said``, the unit in the file or "", and ``place``: file and column, for errors.
     """
 
     digest: bytes
     low: float
     high: float
     unit: Unit
+    said: str
     place: str
 
 
@@ -85,7 +86,7 @@ def _read(source: Source, signals: Sequence[Signal], run: Run, log_map: LogMap, 
             del columns[column]
         place = f"{table.path}, column '{_title(signal, table, chosen)}'"
         raw = _fitted(raw, rows, signal in log_map.inputs, place)
-        recording.heard[signal.name] = _heard(raw, measured, place)
+        recording.heard[signal.name] = _heard(raw, measured, table.units[chosen[0]], place)
         recording.channels[signal.name] = _channel(signal, raw, clock, measured, log_map)
 
 
@@ -131,10 +132,10 @@ def _fitted(raw: FloatArray, rows: int, held: bool, place: str) -> FloatArray:
     raise InvalidValueError(f"{place} has {len(raw)} rows, its time {rows}: as many were expected, map another time")
 
 
-def _heard(raw: FloatArray, measured: Unit, place: str) -> Heard:
+def _heard(raw: FloatArray, measured: Unit, said: str, place: str) -> Heard:
     finite = raw if np.isfinite(raw.sum()) else raw[np.isfinite(raw)]
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (np.nan, np.nan)
-    return Heard(blake2b(np.ascontiguousarray(finite).data, digest_size=16).digest(), low, high, measured, place)
+    return Heard(blake2b(np.ascontiguousarray(finite).data, digest_size=16).digest(), low, high, measured, said, place)
 
 
 def _channel(signal: Signal, raw: FloatArray, clock: Clock, measured: Unit, log_map: LogMap) -> Channel:
@@ -146,14 +147,16 @@ def _channel(signal: Signal, raw: FloatArray, clock: Clock, measured: Unit, log_
     if not kept.all():
         time, values = time[kept], values[kept]
     values = values * (signal.sign * measured.factor / signal.ratio)
-    if len(time) and (signal.heading or signal.smooth > 1):
-        restarts = restarts_of(time, log_map.gap)
-        values = heading_rate(time, values, signal.width, restarts) if signal.heading else values
-        if signal.heading:
-            kept = np.isfinite(values)
-            time, values, restarts = time[kept], values[kept], restarts_of(time[kept], log_map.gap)
-        values = causal_mean(values, signal.smooth, restarts)
+    if len(time) and signal.heading:
+        time, values = _numbers(time, heading_rate(time, values, signal.width, restarts_of(time, log_map.gap)))
+    if len(time) and signal.smooth > 1:
+        time, values = _numbers(time, causal_mean(values, signal.smooth, restarts_of(time, log_map.gap)))
     return Channel(time, values, end if held or not len(time) else float(time[-1]))
+
+
+def _numbers(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    kept = np.isfinite(values)
+    return time[kept], values[kept]
 
 
 def units_of(log_map: LogMap, recording: Recording) -> Mapping[str, tuple[str, str]]:

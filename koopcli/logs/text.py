@@ -67,6 +67,8 @@ def split_unit(title: str) -> tuple[str, str]:
     if match is None or not match.group(1):
         return bare, ""
     unit = next(group for group in match.groups()[1:] if group is not None).strip()
+    if unit.isdigit():  # an index, as in q(1)
+        return bare, ""
     return match.group(1).strip(), unit
 
 

@@ -41,7 +41,10 @@ OF_ONE_RUN = ("steps", "chunk", "reference")  # settings of a simulation that ma
 def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
     measured = [inputs[role].episodes for role in roles_of(inputs) if isinstance(inputs[role], Log)]
     if measured:
-        return _say_still(edmd.fit_measured(measured, settings, context.progress), context)
+        predictor = edmd.fit_measured(measured, settings, context.progress)
+        for note in predictor.regression.notes:
+            context.warn(note)
+        return predictor
     data = Transitions.of([finished(inputs[role], context) for role in roles_of(inputs)])
 
     def over(work: Pass) -> Iterator[Found]:
@@ -64,17 +67,12 @@ def _run(settings: FitEdmd, inputs: Inputs, context: Context) -> Predictor:
             f"the normal equations of raw monomials have condition {regression.condition:.1e}, squared: what this "
             "predictor shows is rounding as much as the method; use the solver 'orthonormal'"
         )
-    return _say_still(predictor, context)
-
-
-def _say_still(predictor: Predictor, context: Context) -> Predictor:
-    """Warn of inputs that a predictor knows nothing of."""
     acting = predictor.dynamics.acting
     still = [name for name, acts in zip(predictor.input_channels.names, acting, strict=True) if not acts]
     if still:
         context.warn(
             f"{', '.join(still)} never moved in these data, so B is zero there: the predictor knows nothing of it; "
-            + ("record some in which it moves" if not predictor.plant else "sample inputs that move (sample.levels)")
+            "sample inputs that move (sample.levels)"
         )
     return predictor
 

@@ -111,7 +111,8 @@ def evaluation(experiment: Experiment, of: Task | None = None, on: Task | None =
         first = trajectories.settings.plant.first
     relift = experiment.evaluate.relift
     if relift is None:
-        relift = not (scored.stage == "fit-eigen" and scored.settings.window.lookup_steps is not None)
+        composed = scored.stage == "fit-eigen" and scored.settings.window.lookup_steps is not None
+        relift = not (composed or (scored.stage == "fit-edmd" and bool(scored.settings.memory)))
     settings = replace(experiment.evaluate, first=first, relift=relift)
     return Task("evaluate", settings, (("predictor", scored), ("trajectories", trajectories)))
 

@@ -18,19 +18,8 @@ class OnLog:
 
 
 def _run(settings: OnLog, inputs: Inputs, context: Context) -> Score:
-    result = score(
-        inputs["predictor"],
-        inputs["dmdc"],
-        inputs["trajectories"].episodes,
-        own=settings.own,
-        progress=context.progress,
-    )
-    if settings.own:
-        context.warn(
-            "the predictor was fitted to this log, so these errors flatter it: those on rows that no fit saw are told "
-            "by koop select"
-        )
-    return result
+    episodes = inputs["trajectories"].episodes
+    return score(inputs["predictor"], inputs["dmdc"], episodes, own=settings.own, progress=context.progress)
 
 
 def _describe(figures: Meta, settings: OnLog) -> str:

@@ -15,7 +15,8 @@ from tests.cli.test_errors import one_line
 from tests.cli.test_help import COMMANDS
 
 FIRST = {"baseline": ["hold"], "plot": ["orders"], "sweep": ["--set", "fit-edmd.order=1,2"]}
-LOOKED_UP = {"--experiment", "--vehicle", "--on"}
+LOOKED_UP = {"--experiment", "--vehicle", "--on", "--from"}
+OF_FILES = {"import"}  # commands whose argument is no name
 ENUMERATED = {"--mirror", "--set"}
 
 
@@ -40,9 +41,8 @@ def test_an_empty_text_is_refused_wherever_one_is_taken(koop, folder, name, opti
         count = sum(p.required for p in COMMANDS[name].params if p.param_type_name == "argument")
         given += ["ctu-2020"] * (count - (len(given) - (2 if option else 0)))
         done = koop(*name.split(), *given, tiny=option != "--experiment")
-        one_line(
-            done, 4 if option is None or option in LOOKED_UP else 2 if option in ENUMERATED else 3, f"'{blank.strip()}"
-        )
+        named = option in LOOKED_UP or (option is None and name not in OF_FILES)
+        one_line(done, 4 if named else 2 if option in ENUMERATED else 3, f"'{blank.strip()}")
     assert not (folder / "artefacts").exists()
 
 

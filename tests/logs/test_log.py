@@ -117,6 +117,13 @@ def test_a_heading_that_wraps_becomes_a_yaw_rate(tmp_path: Path) -> None:
     assert episodes.x[:, 1] == pytest.approx(1.5 + 0.2 * (episodes.time - 0.05), abs=1e-9)
 
 
+def test_a_smoothed_state_begins_at_its_first_whole_mean(tmp_path: Path) -> None:
+    text = MAP.replace('unit = "km/h"', 'unit = "km/h", smooth = 5')
+    episodes = imported(write(tmp_path / "log.csv", drive()), text).episodes
+    assert episodes.starts[0] == pytest.approx(0.04)
+    assert episodes.x[:, 0] == pytest.approx(speed(episodes.time - 0.02), abs=1e-12)
+
+
 def test_clocks_that_start_apart_share_the_time_that_all_have(tmp_path: Path) -> None:
     late = np.arange(1.003, 8, 0.013)
     for name in ("v", "r", "d"):

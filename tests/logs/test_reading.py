@@ -236,3 +236,24 @@ def test_what_the_map_says_of_a_layout_is_taken(write: Write) -> None:
     path = write("log.csv", "1;2\n3;4\n5;6\n")
     table = open_table(path, Source("", header=1, delimiter=";"))
     assert (table.names, table.read([1])[0].tolist()) == (("1", "2"), [4, 6])
+
+
+def test_structs_of_mat_7_3_are_read_by_mat73(tmp_path: Path) -> None:
+    pytest.importorskip("mat73")
+    with h5py.File(tmp_path / "log.mat", "w", userblock_size=512) as file:
+        group = file.create_group("car")
+        group.attrs["MATLAB_class"] = np.bytes_("struct")
+        for name, values in (("t", TIME), ("v", SPEED)):
+            group[name] = values[None]
+            group[name].attrs["MATLAB_class"] = np.bytes_("double")
+    with (tmp_path / "log.mat").open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file")
+    table = open_table(tmp_path / "log.mat")
+    assert sorted(table.names) == ["car.t", "car.v"]
+    assert table.read([table.place("car.v")])[0].tolist() == SPEED.tolist()
+
+
+def test_an_index_in_brackets_is_no_unit(write: Write) -> None:
+    table = open_table(write("log.csv", "t,q(0),q(1),v(furlong/h)\n0,1,2,3\n1,2,3,4\n"))
+    assert table.names == ("t", "q(0)", "q(1)", "v")
+    assert table.place("v(furlong/h)") == 3

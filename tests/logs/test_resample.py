@@ -88,10 +88,12 @@ def test_stretches_that_are_too_short_are_counted() -> None:
     assert stretches(np.zeros(4, dtype=bool), 2) == ([], 0)
 
 
-def test_a_causal_mean_takes_the_past_up_to_a_silence() -> None:
+def test_a_causal_mean_takes_the_past_and_nothing_from_before_a_silence() -> None:
     values = np.array([1.0, 3.0, 5.0, 7.0, 100.0, 102.0])
     restarts = np.array([1, 0, 0, 0, 1, 0], dtype=bool)
-    assert causal_mean(values, 3, restarts).tolist() == [1, 2, 3, 5, 100, 101]
+    means = causal_mean(values, 3, restarts)
+    assert means[2:4].tolist() == [3, 5]
+    assert np.isnan(means[[0, 1, 4, 5]]).all()
     assert causal_mean(values, 1, restarts).tolist() == values.tolist()
 
 

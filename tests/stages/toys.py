@@ -24,7 +24,7 @@ from koopcli.config.shipped import fingerprint
 from koopcli.figures.kit.registry import FIGURES
 from koopcli.koopman.bases.orthonormal import OrthonormalPolynomials
 from koopcli.koopman.bases.polynomial import Polynomial
-from koopcli.koopman.edmd.fit import FitEdmd
+from koopcli.koopman.edmd.fit import FitEdmd, fit_measured
 from koopcli.koopman.eigen.fit import FitEigen
 from koopcli.koopman.eigen.lookup.nearest import NearestLift
 from koopcli.koopman.eigen.nodes import Search, nodes_of
@@ -40,8 +40,13 @@ from koopcli.koopman.predictor.trust import Trust
 from koopcli.koopman.scores.baselines import Forecast
 from koopcli.koopman.scores.evaluation import Evaluation
 from koopcli.koopman.scores.swept import SCORES, Swept
+from koopcli.koopman.selection.score import score
+from koopcli.koopman.selection.select import select
+from koopcli.logs.files import expand
+from koopcli.logs.imported import Log
+from koopcli.logs.map import parse_map
 from koopcli.progress import silent
-from koopcli.records import Meta, Packed, Sample, Trajectories
+from koopcli.records import Channels, Episodes, Meta, Packed, Sample, Trajectories
 from koopcli.simulation.manoeuvres import MANOEUVRES
 from koopcli.simulation.samples.ball import BallSample
 from koopcli.simulation.samples.box import BoxSample
@@ -52,12 +57,17 @@ from koopcli.simulation.samples.grid import GridSample
 from koopcli.simulation.samples.manoeuvre import ManoeuvreSample
 from koopcli.simulation.samples.point import PointSample
 from koopcli.stages.base import Context
+from koopcli.stages.logs import imported
+from koopcli.stages.predict import Predict
 from koopcli.stages.registry import STAGES
+from koopcli.stages.score import OnLog
+from koopcli.stages.select import Select
 from koopcli.vehicles.parameters import MagicFormula, VehicleParameters
 from koopcli.vehicles.plants.forces import ForceInput, Forces
 from koopcli.vehicles.plants.slips import SlipInput, Slips
 from koopcli.vehicles.plants.wheels import TorqueInput, Wheels
 
+SIMULATED = Path(__file__).parents[2] / "data" / "logs" / "simulated"
 PINS = Path(__file__).parents[1] / "golden" / "stages.json"
 BEYOND = 1e12  # a condition number past this is rounding
 TOLERANCE = 1e-6  # above what BLAS threads and processors change, below what any change of a method does
@@ -253,7 +263,12 @@ def figure_records(name: str) -> dict:
         "training": _gliding(),
         "sample": _on_a_surface(),
         "sweep": _swept(),
+        "log": _log(),
+        "selection": select(_log().episodes, Select(bicycle=False).rungs),
+        "score": score(_of_log(), _of_log(0.0), _log().episodes, own=True),
     }
+    if kind.takes == "score":
+        records |= {"predictor": _of_log(), "trajectories": _log()}
     return {f"{i}/{role}": records[role] for i in range(1 if kind.draws == "one" else 2) for role in kind.roles}
 
 
@@ -266,6 +281,25 @@ def _swept() -> Swept:
     counts = dict.fromkeys(("functions", "trajectories", "diverged"), np.arange(12.0))
     names = ("fit-edmd.order", "fit-edmd.terms", "sample.seed")
     return Swept(names, (("1", "2", "4"), ("linear", "bilinear"), ("0", "1")), np.array(places), {**scores, **counts})
+
+
+def _log() -> Log:
+    """Two recordings of a car in small: a speed that a pedal drives, and a yaw rate that steer and speed drive."""
+    t = 0.05 * np.arange(900.0)
+    u = np.stack([np.sin(0.9 * t) + 0.5 * np.sin(2.3 * t + 1), 0.1 * np.sin(1.7 * t) + 0.05 * np.sin(3.1 * t)], axis=1)
+    x = np.empty((900, 2))
+    x[0] = 15.0, 0.0
+    for k in range(899):
+        speed, turn = x[k]
+        x[k + 1] = speed + 0.05 * (2 * u[k, 0] - 0.1 * (speed - 15)), turn + 0.3 * (0.25 * speed * u[k, 1] - turn)
+    channels = Channels(("v_x", "yaw_rate"), ("m/s", "rad/s")), Channels(("pedal", "steer"), ("1", "rad"))
+    bounds, starts, runs = np.array([0, 350, 900]), np.array([1.0, 30.0]), np.array([0, 1])
+    return Log(Episodes(x, u, 0.05, bounds, starts, runs, *channels), display={"yaw_rate": "deg/s", "steer": "deg"})
+
+
+def _of_log(memory: float = 0.2) -> Predictor:
+    how = FitEdmd.of(basis="total", order=1, terms="products" if memory else "linear", memory=memory)
+    return fit_measured(_log().episodes, how)
 
 
 def _chunks(stage, settings, inputs):
@@ -320,6 +354,8 @@ TOYS = {
             {"sample": _driven()},
         ),
         (Simulate(vehicle=ON_WHEELS, reference=True).settled(Wheels(), 3), {"sample": _driven()}),
+        (Simulate(vehicle=CAR, noise=0.1, noise_seed=2).settled(Slips(), 3), {"sample": _slid()}),
+        (Simulate(vehicle=CAR, noise=0.1, noise_memory=0.8).settled(Slips(), 3), {"sample": _slid()}),
     ],
     "fit-edmd": [
         (FitEdmd.of(order=2), {"trajectories": _trajectories(1)}),
@@ -405,6 +441,16 @@ TOYS = {
             ),
             {f"{i}/evaluation": _evaluation().figures() for i in range(2)},
         )
+    ],
+    "import": [(imported(expand([str(SIMULATED)]), parse_map((SIMULATED / "map.toml").read_text())).settings, {})],
+    "select": [
+        (Select(bicycle=False), {"trajectories": _log()}),
+        (Select(memory=(0.1, 0.2), order=(1, 2), blocks=2), {"trajectories": _log()}),
+    ],
+    "score": [(OnLog(), {"predictor": _of_log(), "dmdc": _of_log(0.0), "trajectories": _log()})],
+    "predict": [
+        (Predict(at=3.0, run=1, seconds=0.5), {"predictor": _of_log(), "trajectories": _log()}),
+        (Predict(x0=(14.0, 0.1), u=((0.5, 0.05),) * 5, seconds=0.25), {"predictor": _of_log()}),
     ],
     "plot": [(figure_settings(name), figure_records(name)) for name in FIGURES],
 }

@@ -8,30 +8,28 @@ from typing import Any
 import numpy as np
 
 from koopcli.logs.entries import Source
-from koopcli.logs.formats.table import Table, arrays_table
+from koopcli.logs.formats.table import Table, shaped_table
 
 
 def open_table(path: Path, source: Source) -> Table:
     """The table of the datasets (rows,) and (rows, columns) of a file, whose attribute "units" or "unit" counts."""
-    return datasets(path, turned=False)
-
-
-def datasets(path: Path, turned: bool) -> Table:
-    """The table of a file; ``turned``: its axes run the other way round, as MATLAB writes them."""
     import h5py  # noqa: PLC0415  (only where such a file is met)
 
-    arrays: dict[str, np.ndarray] = {}
+    shapes: dict[str, tuple[int, ...]] = {}
     units: dict[str, str] = {}
 
     def visit(name: str, item: Any) -> None:
-        if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "fiub" or item.ndim not in (1, 2):
-            return
-        if name.startswith("#"):
-            return
-        arrays[name] = item[...].T if turned else item[...]
-        said = item.attrs.get("units", item.attrs.get("unit", ""))
-        units[name] = said.decode() if isinstance(said, bytes) else str(said)
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiub" and not name.startswith("#"):
+            shapes[name] = item.shape
+            said = item.attrs.get("units", item.attrs.get("unit", ""))
+            units[name] = said.decode() if isinstance(said, bytes) else str(said)
+
+    def column(name: str, place: int, turned: bool) -> np.ndarray:
+        with h5py.File(path, "r") as file:
+            dataset = file[name]
+            content = dataset[...] if dataset.ndim == 1 else dataset[place] if turned else dataset[:, place]
+            return np.asarray(content)
 
     with h5py.File(path, "r") as file:
         file.visititems(visit)
-    return arrays_table(path, arrays, units)
+    return shaped_table(path, shapes, column, units)

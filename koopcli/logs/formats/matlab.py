@@ -10,7 +10,7 @@ import numpy as np
 
 from koopcli.errors import InvalidValueError
 from koopcli.logs.entries import Source
-from koopcli.logs.formats.hdf5 import datasets
+from koopcli.logs.formats.hdf5 import open_table as open_hdf5
 from koopcli.logs.formats.table import Table, arrays_table, extra
 
 
@@ -19,7 +19,7 @@ def open_table(path: Path, source: Source) -> Table:
     with path.open("rb") as stream:
         begins = stream.read(128)
     if begins.startswith(b"MATLAB 7.3") or begins.startswith(b"\x89HDF"):
-        return _of_hdf5(path)
+        return _of_hdf5(path, source)
     import scipy.io  # noqa: PLC0415  (only where such a file is met)
 
     try:
@@ -29,13 +29,13 @@ def open_table(path: Path, source: Source) -> Table:
     return arrays_table(path, dict(_leaves(content)))
 
 
-def _of_hdf5(path: Path) -> Table:
+def _of_hdf5(path: Path, source: Source) -> Table:
     import h5py  # noqa: PLC0415  (only where such a file is met)
 
     with h5py.File(path, "r") as file:
         plain = all(isinstance(item, h5py.Dataset) and item.dtype.kind in "fiub" for item in file.values())
     if plain:
-        return datasets(path, turned=True)
+        return open_hdf5(path, source)
     return arrays_table(path, dict(_leaves(extra("mat73", "mat73", path).loadmat(str(path)))))
 
 

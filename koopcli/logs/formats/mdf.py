@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ def open_table(path: Path, source: Source) -> Table:
     if not places:
         raise InvalidValueError(f"{path} holds no channel: decode its CAN frames with a DBC first")
 
+    @lru_cache(maxsize=1)
     def fetch(place: int) -> tuple[FloatArray, FloatArray]:
         group, channel = places[place]
         signal = file.get(group=group, index=channel)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -12,11 +12,12 @@ import numpy as np
 
 from koopcli.errors import InvalidValueError
 from koopcli.logs.entries import Column
-from koopcli.logs.units import known
+from koopcli.logs.text import split_unit
 from koopcli.logs.values import near
 from koopcli.records import FloatArray
 
 TIMES = ("t", "time", "timestamp", "timestamps", "times", "time_s")
+WIDEST = 64  # columns of one array
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +66,7 @@ class Table:
             return places[int(count) - 1]
         if places:
             raise InvalidValueError(f"{self.path} has {len(places)} columns '{name}': '{column}' is none of them")
-        bare = _without_unit(column)
+        bare, _ = split_unit(column.lstrip("#% "))
         if bare != column and bare in self.names:
             return self.place(bare)
         names = list(dict.fromkeys(name for name in self.names if name))
@@ -94,23 +95,41 @@ class Table:
 
 
 def arrays_table(path: Path, arrays: dict[str, np.ndarray], units: dict[str, str] | None = None) -> Table:
-    """The table of named arrays: (rows,) is a column, (rows, m) are m columns of one name; others are left out."""
-    names: list[str] = []
-    columns: list[np.ndarray] = []
-    for name, values in arrays.items():
-        if values.dtype.kind not in "fiub" or values.ndim not in (1, 2) or values.size < 2:
+    """The table of named arrays in memory, as :func:`shaped_table`."""
+
+    def column(name: str, place: int, turned: bool) -> np.ndarray:
+        values = arrays[name]
+        return values if values.ndim == 1 else values[place] if turned else values[:, place]
+
+    shapes = {name: values.shape for name, values in arrays.items() if values.dtype.kind in "fiub"}
+    return shaped_table(path, shapes, column, units or {})
+
+
+def shaped_table(
+    path: Path,
+    shapes: Mapping[str, tuple[int, ...]],
+    column: Callable[[str, int, bool], np.ndarray],
+    units: Mapping[str, str],
+) -> Table:
+    """The table of named arrays: (rows,) is a column, (rows, m) or (m, rows) are m columns of one name.
+
+    Rows are the longer axis. Arrays of other shapes, of one row and of more than ``WIDEST`` columns are left out.
+    ``column``: the values of an array at a place of its shorter axis, which is the first if it is turned.
+    """
+    places: list[tuple[str, int, bool]] = []
+    for name, shape in shapes.items():
+        if len(shape) not in (1, 2) or max(shape) < 2 or (len(shape) == 2 and min(shape) > WIDEST):
             continue
-        flat = values.reshape(-1, 1) if values.ndim == 1 or 1 in values.shape else values
-        names += [name] * flat.shape[1]
-        columns += [flat[:, place] for place in range(flat.shape[1])]
-    if not columns:
+        turned = len(shape) == 2 and shape[0] < shape[1]
+        places += [(name, place, turned) for place in range(min(shape) if len(shape) == 2 else 1)]
+    if not places:
         raise InvalidValueError(f"{path} holds no column of numbers: arrays of at least two rows were expected")
 
-    def read(places: Sequence[int]) -> list[FloatArray]:
-        return [np.array(columns[place], dtype=np.float64) for place in places]
+    def read(asked: Sequence[int]) -> list[FloatArray]:
+        return [np.array(column(*places[place]), dtype=np.float64) for place in asked]
 
-    said = tuple((units or {}).get(name, "") for name in names)
-    return Table(path, tuple(names), said, read, ordered=len(arrays) == 1)
+    names = tuple(name for name, _, _ in places)
+    return Table(path, names, tuple(units.get(name, "") for name in names), read, ordered=len(shapes) == 1)
 
 
 def extra(module: str, name: str, path: Path) -> ModuleType:
@@ -121,11 +140,3 @@ def extra(module: str, name: str, path: Path) -> ModuleType:
         raise InvalidValueError(
             f'{path.name} needs a library that is not installed: pip install "koopcli[{name}]"'
         ) from error
-
-
-def _without_unit(column: str) -> str:
-    for opening in "([":
-        name, mark, unit = column.partition(opening)
-        if mark and known(unit.rstrip(")] ")):
-            return name.strip().lstrip("#% ").strip()
-    return column.strip().lstrip("#% ").strip()
