@@ -1,4 +1,4 @@
-"""The tutorial on one's own logs keeps its word: its commands run in an empty folder, its lines are printed as shown."""
+"""The tutorial on one's own logs keeps its word: commands run in an empty folder, lines are printed as shown."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import subprocess
 import pytest
 
 from koopcli.config.data import data_folder
-from tests.conftest import Result
 from tests.test_readme import NAME, ROOT, masked, run
 
 PAGE = (ROOT / "docs" / "own-data.md").read_text(encoding="utf-8")
@@ -42,7 +41,7 @@ def told(koop, folder):
         return names[full[0]]
 
     def heard(*words, tiny):
-        done: Result = koop(*words, tiny=tiny)
+        done = koop(*words, tiny=tiny)
         printed.extend(f"{done.out}\n{done.err}".splitlines())
         return done
 

@@ -91,7 +91,7 @@ def _show(checks: Sequence[Check]) -> None:
         [
             check.name.replace("_", " "),
             check.signal,
-            f"{check.value:.3g} {check.unit}".strip(),
+            check.measured,
             check.healthy,
             check.verdict,
         ]

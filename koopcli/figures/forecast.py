@@ -87,8 +87,8 @@ def draw(shown: Shown) -> Figure:
                 panel.plot(time[0], shown.measured[j, 0, i], "o", color=OTHERS[0], markersize=2.5)
             panel.set_ylabel(axis_label(shown.channels.names[i], shown.channels.units[i]))
             ticks(panel.yaxis, 3)
-        length = shown.time[0, -1]
-        panels[-1].set_xticks([time[0] for time in shown.time], [f"{k + 1}" for k in range(len(shown.time))])
-        panels[-1].set_xlabel(f"start; each prediction lasts {length:.2g} s")
+        ends = shown.time[:, [0, -1]].ravel()
+        panels[-1].set_xticks(ends, [f"{time:.2g}" for time in np.tile(shown.time[0, [0, -1]], len(shown.time))])
+        panels[-1].set_xlabel("time from each start (s)")
         legend_below(figure, columns=3)
     return figure

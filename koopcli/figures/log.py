@@ -84,7 +84,7 @@ def _laid_out(episodes: Episodes) -> tuple[FloatArray, list[tuple[float, float]]
 
 def _words(check: Check) -> str:
     about = f"{check.name.replace('_', ' ')}{f' of {check.signal}' if check.signal else ''}"
-    return f"{check.verdict}: {about} {check.value:.3g} {check.unit}".replace(" 1,", ",")
+    return f"{check.verdict}: {about} {check.measured}"
 
 
 def numbers(shown: Shown) -> Mapping[str, Array]:
@@ -110,7 +110,7 @@ def draw(shown: Shown) -> Figure:
                 panel.plot(shown.time[rows], values[rows], color=COLOURS[0], linewidth=0.7)
             panel.set_title(axis_label(name.replace("$", ""), shown.units[name]), loc="left", fontsize=SMALLEST, pad=2)
             ticks(panel.yaxis, 3)
-        panels[-1].set_xlabel("time (s); grey: nothing recorded")
+        panels[-1].set_xlabel("nothing was recorded where it is grey; time (s)")
         if shown.doubts:
             figure.supxlabel("\n".join(map(plain, shown.doubts)), fontsize=SMALLEST, color=GUIDE, ha="center")
     return figure

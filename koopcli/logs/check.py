@@ -26,6 +26,11 @@ class Check:
     hint: str = ""
     signal: str = ""
 
+    @property
+    def measured(self) -> str:
+        """The value with its unit, if it has one."""
+        return f"{self.value:.3g}" if self.unit == "1" else f"{self.value:.3g} {self.unit}"
+
     def pack(self) -> Meta:
         """The check as JSON."""
         return dict(vars(self))

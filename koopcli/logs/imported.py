@@ -30,7 +30,8 @@ class Log(Content):
 
     def __repr__(self) -> str:
         asked = sum(check.verdict == "ask" for check in self.checks)
-        return f"Log: {len(self.checks)} checks, {asked} that ask, {len(self.notes)} notes\n{self.episodes!r}"
+        told = f"{len(self.checks)} checks, {asked} that ask, {len(self.notes)} notes"
+        return f"Log: {told}; {self.episodes!r}"
 
     def pack(self) -> Packed:
         """The log for storage."""

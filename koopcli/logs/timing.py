@@ -24,10 +24,10 @@ def time_checks(clocks: Sequence[Mapping[str, Clock]], dt: float, silent: Mappin
 
     ``silent``: the lengths in s of the silences that ended an episode, by signal.
     """
-    jitters = {name: jitter_of(clock, dt) for run in clocks for name, clock in run.items()}
+    jitters: dict[str, float] = {}
     for run in clocks:
         for name, clock in run.items():
-            jitters[name] = max(jitters[name], jitter_of(clock, dt))
+            jitters[name] = max(jitters.get(name, 0.0), jitter_of(clock, dt))
     worst = max(jitters, key=lambda name: jitters[name])
     repeated = {name: sum(run[name].repeated for run in clocks if name in run) for name in jitters}
     first = [name for name in jitters if any(run[name].first for run in clocks if name in run)]
@@ -45,15 +45,15 @@ def time_checks(clocks: Sequence[Mapping[str, Clock]], dt: float, silent: Mappin
         Check(
             "repeated_time",
             float(sum(repeated.values())),
-            "rows",
+            "1",
             "0",
             "note" if any(repeated.values()) else "ok",
             f"of rows with one time the last counts: {_counts(repeated)}" if any(repeated.values()) else "",
         ),
         Check(
             "gaps",
-            float(len(lengths)),
-            "silences",
+            float(max(map(len, silent.values()), default=0)),
+            "1",
             "0",
             "note" if lengths else "ok",
             f"an episode ends at each, the longest lasts {max(lengths):.3g} s: {_counts(silent)}" if lengths else "",
@@ -61,7 +61,7 @@ def time_checks(clocks: Sequence[Mapping[str, Clock]], dt: float, silent: Mappin
         Check(
             "first_row",
             float(len(first)),
-            "sources",
+            "1",
             "0",
             "note" if first else "ok",
             f"a first row later than the second was left out: {', '.join(first)}" if first else "",

@@ -59,10 +59,7 @@ def _tables(selection: Selection, log: Log) -> list[Table]:
     blocks = [
         [str(i + 1), block["picked"], f"{block['ratio_to_dmdc']:.2f}"] for i, block in enumerate(figures["blocks"])
     ]
-    checks = [
-        [check.name, check.signal, f"{check.value:.3g} {check.unit}", check.healthy, check.verdict]
-        for check in log.checks
-    ]
+    checks = [[check.name, check.signal, check.measured, check.healthy, check.verdict] for check in log.checks]
     return [
         Table("Errors on rows held out", ["state", "ahead", "RMSE", "× hold", "× DMDc"], errors, left=2),
         Table("Parts held out", ["part", "picked without it", "× DMDc"], blocks, left=2),

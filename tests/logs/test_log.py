@@ -154,7 +154,7 @@ def test_a_silence_and_what_is_not_kept_and_nan_end_an_episode(tmp_path: Path) -
     assert episodes.starts == pytest.approx([0.55, 3.55, 6.5])
     ends = episodes.time[episodes.bounds[1:] - 1]
     assert ends == pytest.approx([3.0, 6.0, 8.95])
-    assert check(log, "gaps") == (4, "note")
+    assert check(log, "gaps") == (2, "note")
     assert episodes.x[:, 0] == pytest.approx(speed(episodes.time), abs=1e-9)
 
 

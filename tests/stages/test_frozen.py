@@ -17,6 +17,8 @@ from koopcli.store.pins import pins
 from koopcli.store.verify import verify
 from tests.stages.frozen import STORE, tasks
 
+LATER = {"import", "select", "score", "predict"}  # stages younger than this store
+
 
 @pytest.fixture(scope="module")
 def frozen(tmp_path_factory):
@@ -29,7 +31,7 @@ def records(store):
 
 
 def test_it_has_something_of_every_stage(frozen):
-    assert {record.stage for record in records(frozen).values()} == STAGES.keys()
+    assert {record.stage for record in records(frozen).values()} == STAGES.keys() - LATER
     assert set(pins(frozen)["kept"]) == records(frozen).keys()
 
 

@@ -53,7 +53,16 @@ def test_what_an_experiment_is_about_changes_no_recipe(fit):
     assert order_sweep(recipes, paper) == order_sweep(recipes, about(fit))
 
 
-@pytest.mark.parametrize("name", FIGURES)
+OF_LOGS = [name for name, kind in FIGURES.items() if kind.takes in figure_tasks.OF_LOGS.values()]
+
+
+@pytest.mark.parametrize("name", OF_LOGS)
+def test_a_figure_of_a_log_is_not_made_of_nothing(name):
+    with pytest.raises(InvalidValueError, match="which koop cannot make: name it"):
+        figure_tasks.artefacts(name, load_experiment("paper", {}))
+
+
+@pytest.mark.parametrize("name", [name for name in FIGURES if name not in OF_LOGS])
 def test_a_figure_follows_the_experiment_or_is_for_one_fit(name):
     """One that makes no fit follows nothing; one that is for a fit says so where the experiment is about the other."""
 
