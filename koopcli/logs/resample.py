@@ -1,4 +1,4 @@
-"""Channels that were sampled each at its own times, on one grid; where one is silent, no row is invented."""
+"""Channels that were sampled each at its own times, on one grid; where one is silent, no row is invented (10.1)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A predictor from measured data: the increment of a state regressed on it, its past, and inputs (docs/equations.md 4).
+"""A predictor from measured data: the increment of a state regressed on it, its past and inputs, eqs. (10.2) to (10.5).
 
 A ridge on increments draws a fit towards a state that is held, where one on the next state draws it to zero.
 """

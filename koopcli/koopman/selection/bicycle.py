@@ -1,4 +1,4 @@
-"""The bicycle identified from the same rows: what a few physical parameters achieve, to compare with."""
+"""The bicycle identified from the same rows: what a few physical parameters achieve, to compare with (10.15)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The choice among a few rungs, by blocks that the fit did not see."""
+"""The choice among a few rungs, by blocks that the fit did not see (10.9)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the inputs do in a log: how far they explain the states, and whether training saw what is asked of them."""
+"""What the inputs do in a log: how far they explain the states, and whether training saw what is asked of them (10.11)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The verdict on a measured log in plain sentences."""
+"""The verdict on a measured log in plain sentences (10.10)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Windows of held-out rows: where forecasts start, how far they go, and what they are compared with."""
+"""Windows of held-out rows: where forecasts start, how far they go, and what they are compared with (10.7)."""
 
 from __future__ import annotations
 
