@@ -1,4 +1,4 @@
-"""Least squares on centred columns of equal spread, from sums about their means that are collected block by block (10.3)."""
+"""Least squares on centred columns of equal spread, from sums about their means that are collected block by block."""
 
 from __future__ import annotations
 

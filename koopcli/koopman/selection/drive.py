@@ -1,4 +1,4 @@
-"""What the inputs do in a log: how far they explain the states, and whether training saw what is asked of them (10.11)."""
+"""What the inputs do in a log (10.11): how far they explain the states, whether training saw what is asked of them."""
 
 from __future__ import annotations
 

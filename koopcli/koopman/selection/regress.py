@@ -1,4 +1,4 @@
-"""The regression that blocks are judged by: the increment of the state on present, past and products (10.3), in memory."""
+"""The regression (10.3) that blocks are judged by: increments of the state on present, past and products, in memory."""
 
 from __future__ import annotations
 
