@@ -15,6 +15,8 @@ import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
+
 HERE = Path(__file__).parent
 KOOP = [sys.executable, "-m", "koopcli"]
 RUNS = 5
@@ -61,6 +63,48 @@ def lifts(work: Path) -> None:
         row(f"{name}, a lift of one state: CPU ms, and beside 2 000³ dgemm", figure, for_one)
         figure = f"{many:.2f} = dgemm × {many / product:.1f}"
         row(f"{name}, a lift of 2 000 states: CPU s, and beside it", figure, for_many)
+
+
+ROWS, COLUMNS = 100_000, 20  # of a log
+SELECTED = 13_750  # rows that a predictor is chosen on
+MAP = """log = {{ dt = {dt} }}
+[source.log]
+file = "{file}"
+time = {{ column = "t", unit = "s" }}
+[states]
+v_x = {{ source = "log", column = "c1", unit = "m/s" }}
+v_y = {{ source = "log", column = "c2", unit = "m/s" }}
+yaw_rate = {{ source = "log", column = "c3", unit = "rad/s" }}
+[inputs]
+steer = {{ source = "log", column = "c4", unit = "rad" }}
+pedal = {{ source = "log", column = "c5", unit = "1" }}
+"""
+
+
+def logs(work: Path) -> None:
+    """How long a log takes to come in, and a choice on it, beside a product of two matrices of 2 000 × 2 000."""
+    product = medians([task("dgemm", work) for _ in range(RUNS)])["cpu"]
+    names = {}
+    for rows, columns, dt in ((ROWS, COLUMNS, 0.02), (SELECTED, 6, 0.04)):
+        t = dt * np.arange(rows)
+        table = np.stack([t, *(np.sin((0.3 + 0.1 * i) * t) + 0.1 * np.sin(7 * i * t) for i in range(1, columns))])
+        table[1] += 15
+        file, header = work / f"log{rows}.csv", ",".join(["t", *(f"c{i}" for i in range(1, columns))])
+        np.savetxt(file, table.T, delimiter=",", header=header, comments="", fmt="%.9g")
+        (work / f"{rows}.toml").write_text(MAP.format(dt=dt, file=file.name), encoding="utf-8")
+        store = ["--store", str(work / "logs")]
+        line = [*KOOP, "import", str(file), "--map", str(work / f"{rows}.toml"), *store]
+        spent = command(*line)
+        names[rows] = subprocess.run(line, check=True, capture_output=True, text=True).stdout.strip()
+        figure = f"{spent['cpu']:.2f} = dgemm × {spent['cpu'] / product:.1f}, {spent['memory']:.0f} MB"
+        row(f"import of {rows:,} rows × {columns} columns, whole process: CPU s, and beside 2 000³ dgemm", figure, "")
+    spent = command(*KOOP, "select", names[SELECTED], "--no-bicycle", *store)
+    figure = f"{spent['cpu']:.2f} = dgemm × {spent['cpu'] / product:.1f}"
+    row(
+        f"select on {SELECTED:,} rows, 3 states, 2 inputs, whole process: CPU s, and beside it",
+        figure,
+        "≤ 5 + start-up",
+    )
 
 
 def main() -> None:
@@ -127,6 +171,7 @@ def main() -> None:
         row(what, f"{quick['cpu']:.2f} / {slowly['cpu']:.2f} = 1 / {slowly['cpu'] / quick['cpu']:.0f}", "")
 
     lifts(work)
+    logs(work)
     best = [*KOOP, "evaluate", "--experiment", "best-eigen", "--store", str(work / "best")]
     clock = time.perf_counter()
     fit = subprocess.run(

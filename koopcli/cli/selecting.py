@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
 from koopcli.cli.completion import complete_name
@@ -120,6 +121,13 @@ def _show(selection: Selection) -> None:
         for horizon, about in horizons.items()
     ]
     show_table(["state", "unit", "ahead", "RMSE", "× hold", "× DMDc"], rows, left=2, file=sys.stderr)
+    relative = np.exp(selection.scores - selection.scores[0])
+    inner = [
+        [rung.label, *("–" if np.isnan(ratio) else f"{ratio:.3f}" for ratio in ratios)]
+        for rung, ratios in zip(selection.rungs, relative.tolist(), strict=True)
+    ]
+    header = ["error in each inner block", *(str(i + 1) for i in range(relative.shape[1]))]
+    show_table(header, inner, left=1, file=sys.stderr)
     low, high = selection.span("chosen")
     blocks = [
         [str(i + 1), block["picked"], f"{block['ratio_to_dmdc']:.2f}"] for i, block in enumerate(figures["blocks"])
@@ -130,9 +138,6 @@ def _show(selection: Selection) -> None:
         "RMSE after 0.5 s over the blocks: " + ", ".join(f"{name} {a:.3g} to {b:.3g}" for name, a, b in span),
         file=sys.stderr,
     )
-    for name in selection.models:
-        if name in ("mean", "bicycle"):
-            print(f"{name}: {selection.ratio(name, 'dmdc'):.2f} × DMDc", file=sys.stderr)
     outside, limited = 100 * figures["outside_share"], 100 * figures["limited_share"]
     print(
         f"{outside:.1f} % of the held-out rows lie outside the states of their training, {limited:.1f} % of the inputs "

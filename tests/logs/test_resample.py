@@ -116,3 +116,12 @@ def test_no_rate_is_taken_across_a_silence() -> None:
 @pytest.mark.parametrize(("step", "rounded"), [(0.0398, 0.04), (0.0333, 0.033), (0.01001, 0.01), (0.0249, 0.025)])
 def test_a_step_is_rounded_to_what_is_sensible(step: float, rounded: float) -> None:
     assert sensible_step(step) == rounded
+
+
+def test_a_curve_is_interpolated_with_an_error_of_order_two_in_its_samples() -> None:
+    errors = []
+    for step in (0.04, 0.02, 0.01):
+        time = np.arange(0, 4, step)
+        grid = grid_of([channel(time, time)], 0.0317)
+        errors.append(np.abs(interpolated(grid, channel(time, np.sin(5 * time))) - np.sin(5 * grid)).max())
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([2, 2], abs=0.1)
