@@ -12,7 +12,7 @@ import typer
 
 from koopcli.cli.completion import complete_name
 from koopcli.cli.invocation import begin
-from koopcli.cli.options import DryRunOption, JsonOption, StoreOption
+from koopcli.cli.options import DryRunOption, JsonOption, StoreOption, WorkersOption
 from koopcli.config.grids import parse_grid
 from koopcli.console import show_table
 from koopcli.errors import InvalidValueError, UsageError
@@ -48,6 +48,7 @@ def select(
     report: Annotated[
         Path | None, typer.Option("--report", metavar="FILE.html", help="Write the verdict with its pictures.")
     ] = None,
+    workers: WorkersOption = 1,
     store: StoreOption = None,
     dry_run: DryRunOption = False,
     as_json: JsonOption = False,
@@ -61,7 +62,7 @@ def select(
 
     Example: koop select import/3f2a --report verdict.html
     """
-    call = begin(store, "paper", None, (), {})
+    call = begin(store, "paper", None, (), {}, workers)
     from koopcli.checks import build
     from koopcli.stages import measured
     from koopcli.stages.select import Select

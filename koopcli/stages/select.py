@@ -10,8 +10,10 @@ from koopcli.koopman.edmd.fit import FitEdmd
 from koopcli.koopman.edmd.increments import RIDGE
 from koopcli.koopman.selection.record import Selection
 from koopcli.koopman.selection.regress import Rung
-from koopcli.koopman.selection.select import select
-from koopcli.records import Meta
+from koopcli.koopman.selection.select import judged, laid_out, select
+from koopcli.koopman.selection.verdict import Block
+from koopcli.progress import Progress
+from koopcli.records import Meta, Packed
 from koopcli.stages.base import Context, Cost, Inputs, Stage
 
 
@@ -46,7 +48,15 @@ def fit_of(rung: Rung) -> FitEdmd:
 
 def _run(settings: Select, inputs: Inputs, context: Context) -> Selection:
     episodes = inputs["trajectories"].episodes
-    return select(episodes, settings.rungs, settings.blocks, settings.bicycle, context.progress)
+    laid_out(episodes, settings.rungs, settings.blocks)  # which refuses a log that is too short, once
+    blocks = [Block.unpack(part) for part in context.chunks(settings.blocks, 1)]
+    return select(episodes, settings.rungs, settings.blocks, settings.bicycle, blocks)
+
+
+def _chunk(settings: Select, inputs: Inputs, rows: slice, progress: Progress) -> Packed:
+    """One block held out."""
+    episodes = inputs["trajectories"].episodes
+    return judged(episodes, settings.rungs, settings.blocks, settings.bicycle, rows.start).pack()
 
 
 def _describe(figures: Meta, settings: Select) -> str:
@@ -63,5 +73,6 @@ STAGE = Stage(
     figures=Selection.figures,
     describe=_describe,
     check=lambda task: None,
+    chunk=_chunk,
     estimate=lambda task: Cost(2.0 + 1.5 * len(task.settings.rungs) * task.settings.blocks, 1e5),
 )

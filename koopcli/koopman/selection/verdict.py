@@ -15,7 +15,7 @@ from koopcli.koopman.selection.drive import outside
 from koopcli.koopman.selection.record import BICYCLE, CHOSEN, DMDC_ROW, HOLD, MEAN
 from koopcli.koopman.selection.regress import DMDC, Rung, fit, pair_rows
 from koopcli.koopman.selection.windows import OUTER, Windows, ahead_of, rmse
-from koopcli.records import BoolArray, FloatArray
+from koopcli.records import Array, BoolArray, FloatArray, Packed
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +31,29 @@ class Block:
     missed: FloatArray
     outside: BoolArray
     limited: BoolArray
+
+    def pack(self) -> Packed:
+        """The block for another process."""
+        arrays = {
+            **{f"errors/{name}": Array(values, ("step", "state"), "1") for name, values in self.errors.items()},
+            "missed": Array(self.missed, ("window", "step", "state"), "1"),
+            "outside": Array(self.outside.astype(np.int8), ("row",), "1"),
+            "limited": Array(self.limited.astype(np.int8), ("row",), "1"),
+            "scores": Array(self.choice.scores, ("rung", "inner_block"), "1"),
+        }
+        return Packed(arrays, {"picked": self.choice.picked, "blind": self.choice.blind, "models": list(self.errors)})
+
+    @classmethod
+    def unpack(cls, packed: Packed) -> Block:
+        """The inverse of :meth:`pack`."""
+        values = {name: np.asarray(array.values[...]) for name, array in packed.arrays.items()}
+        return cls(
+            choice=Choice(packed.meta["picked"], values["scores"], packed.meta["blind"]),
+            errors={name: values[f"errors/{name}"] for name in packed.meta["models"]},
+            missed=values["missed"],
+            outside=values["outside"].astype(bool),
+            limited=values["limited"].astype(bool),
+        )
 
 
 def judge(

@@ -7,11 +7,13 @@ import pytest
 
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.selection.blocks import Holding, folds, pieces_of
+from koopcli.koopman.selection.choice import DEFAULT
 from koopcli.koopman.selection.drive import beyond, explained, outside
 from koopcli.koopman.selection.record import LEVELS, Selection
 from koopcli.koopman.selection.regress import Rung
-from koopcli.koopman.selection.select import select
+from koopcli.koopman.selection.select import judged, select
 from koopcli.koopman.selection.sentences import is_predicted
+from koopcli.koopman.selection.verdict import Block
 from tests.koopman.selection.logs import bilinear, delayed, log, smooth_inputs
 
 KEYS = ["chosen_rung", "verdict", "ratio_to_dmdc", "ratio_to_hold", "per_state", "blocks"]
@@ -180,12 +182,15 @@ def test_a_ladder_and_more_blocks_can_be_asked_for() -> None:
     assert selection.chosen_rung in ("linear, 0.2 s", "linear, 0.6 s")
 
 
-def test_runs_are_dealt_out_and_progress_is_told() -> None:
-    told: list[tuple[int, int]] = []
-    episodes = log(*delayed(), [200] * 12, list(range(12)))
-    selection = select(episodes, progress=lambda done, total: told.append((done, total)))
-    assert told == [(0, 4), (1, 4), (2, 4), (3, 4), (4, 4)]
+def test_runs_are_dealt_out() -> None:
+    selection = select(log(*delayed(), [200] * 12, list(range(12))))
     assert selection.ratio("chosen", "dmdc") < 0.1
+
+
+def test_blocks_judged_elsewhere_give_the_same(of_delayed: Selection) -> None:
+    episodes = log(*delayed())
+    blocks = [Block.unpack(judged(episodes, DEFAULT, 3, False, i).pack()) for i in range(3)]
+    assert select(episodes, blocks=blocks) == of_delayed
 
 
 def test_a_log_without_inputs_is_selected_for() -> None:
