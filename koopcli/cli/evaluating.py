@@ -118,11 +118,16 @@ def _show_states(console: Console, artefact: Artefact) -> None:
             "the predictor was fitted to this log, so these errors flatter it: those on rows that no fit saw are told "
             "by koop select"
         )
-    channels = artefact.content.state_channels
+    channels, figures = artefact.content.state_channels, artefact.figures
+    outside, limited = (100 * figures[name] for name in ("outside_share", "limited_share"))
+    console.note(
+        f"{outside:.1f} % of the starts lie outside the states of training, {limited:.1f} % of the inputs are limited "
+        "to theirs"
+    )
     rows = [
         [name, unit, f"{horizon} s", f"{about['rmse']:.3g}", f"{about['to_hold']:.2f}", f"{about['to_dmdc']:.2f}"]
         for name, unit in zip(channels.names, channels.units, strict=True)
-        for horizon, about in artefact.figures["per_state"][name].items()
+        for horizon, about in figures["per_state"][name].items()
     ]
     show_table(["state", "unit", "ahead", "RMSE", "× hold", "× DMDc"], rows, left=2, file=sys.stderr)
 

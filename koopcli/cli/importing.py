@@ -11,6 +11,7 @@ import typer
 
 from koopcli.cli.invocation import begin, print_json
 from koopcli.cli.options import DryRunOption, JsonOption, StoreOption
+from koopcli.cli.outputs import check_outputs, write_text
 from koopcli.console import Console, show_table
 from koopcli.errors import InvalidValueError, UsageError
 
@@ -55,7 +56,12 @@ def import_(
     from koopcli.logs.files import expand
 
     paths = expand(files)
+    check_outputs(output, None, as_json=as_json)
     if suggest:
+        if map_ is not None:
+            raise UsageError("--suggest writes a first map and reads none: leave out --map")
+        if output is not None and output.exists():
+            raise UsageError(f"{output} is there already, and may have been edited: name another file, or remove it")
         _suggest(paths, output, as_json=as_json)
         return
     if output is not None:
@@ -116,7 +122,7 @@ def _suggest(paths: Sequence[Path], output: Path | None, *, as_json: bool) -> No
     elif output is None:
         print(suggestion.text, end="")
     else:
-        output.write_text(suggestion.text, encoding="utf-8")
+        write_text(output, suggestion.text)
         console.note(f"wrote {output}: look through it, then koop import … --map {output}")
 
 

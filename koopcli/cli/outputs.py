@@ -64,6 +64,11 @@ def write_outputs(console: Console, image: bytes, output: Path | None, content: 
         console.note(f"wrote {csv}")
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a file of ``text``. Raises ``StorageError`` where that is not possible."""
+    _write(path, text.encode())
+
+
 def _check(path: Path) -> None:
     try:
         writable = not is_folder(path) and os.access(path if _in_place(path) else path.parent, os.W_OK)

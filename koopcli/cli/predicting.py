@@ -33,7 +33,10 @@ def predict(
     ] = None,
     inputs: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.csv", help="Inputs in SI: a column for each by its name, a row for each step."),
+        typer.Option(
+            metavar="FILE.csv",
+            help="Inputs: a column for each by its name, with its unit in brackets unless that is SI; a row a step.",
+        ),
     ] = None,
     seconds: Annotated[
         float | None, typer.Option(metavar="S", help="How far to predict (1 s, or as the inputs).")
@@ -46,8 +49,8 @@ def predict(
     """Predict from a state of a log, or from one that is given.
 
     From a log the prediction has the history that it starts from, the inputs that were measured, and the measured
-    states beside it. From --x0 alone it is as if the car had stood so for as long as the predictor remembers. With
-    --csv the table is written in the units of the map.
+    states beside it, and --csv writes the table in the units of the map. From --x0 alone it is as if the car had stood
+    so for as long as the predictor remembers; its table is in SI.
 
     Example: koop predict fit-edmd/3f2a --from import/51c0 --at 12.3 --csv -
     """
@@ -60,7 +63,8 @@ def predict(
     log = call.optional(from_, ["import"], "--from", ())
     of = call.named(predictor, tuple(fits.LIFTED), "the PREDICTOR", ())
     if (log is None) == (x0 is None):
-        raise UsageError("say where to start: --from LOG --at S, or --x0 X,Y,…")
+        what = "say where to start" if x0 is None else "--from and --x0 are two starts, choose one"
+        raise UsageError(f"{what}: --from LOG --at S, or --x0 X,Y,…")
     if log is not None and (at is None or inputs is not None):
         raise UsageError("--from LOG goes with --at S, and takes the inputs of the log, not --inputs")
     values: dict[str, Any] = {"run": run}
@@ -92,20 +96,24 @@ def _numbers(text: str) -> list[float]:
 
 
 def _rows(path: Path, names: tuple[str, ...]) -> list[list[float]]:
-    """The inputs in a CSV file, in the order of ``names``."""
+    """The inputs in a CSV file in SI, in the order of ``names``."""
+    from koopcli.logs.units import unit
+
     try:
         with path.open(encoding="utf-8") as file:
-            header = [name.partition("(")[0].strip() for name in file.readline().split(",")]
+            titles = [title.partition("(") for title in file.readline().split(",")]
             values = np.loadtxt(file, delimiter=",", ndmin=2)
     except (OSError, ValueError, UnicodeDecodeError) as error:
         raise InvalidValueError(f"--inputs {path}: {error}") from error
+    header = [name.strip() for name, _, _ in titles]
+    factors = [unit(text.strip().rstrip(")"), f"--inputs {path}").factor if text else 1.0 for _, _, text in titles]
     missing = [name for name in names if name not in header]
     if missing or values.shape[1:] != (len(header),) or not len(values):
         raise InvalidValueError(
             f"--inputs {path} must have a header with {', '.join(names)} and a row for each step, got the columns "
             f"{', '.join(header)} and {len(values)} rows"
         )
-    return [[float(row[header.index(name)]) for name in names] for row in values]
+    return [[float(row[header.index(name)] * factors[header.index(name)]) for name in names] for row in values]
 
 
 def register(app: typer.Typer) -> None:

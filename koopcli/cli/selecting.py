@@ -13,6 +13,7 @@ import typer
 from koopcli.cli.completion import complete_name
 from koopcli.cli.invocation import begin
 from koopcli.cli.options import DryRunOption, JsonOption, StoreOption, WorkersOption
+from koopcli.cli.outputs import check_outputs, write_text
 from koopcli.config.grids import parse_grid
 from koopcli.console import show_table
 from koopcli.errors import InvalidValueError, UsageError
@@ -62,6 +63,7 @@ def select(
 
     Example: koop select import/3f2a --report verdict.html
     """
+    check_outputs(report, None, as_json=as_json)
     call = begin(store, "paper", None, (), {}, workers)
     from koopcli.checks import build
     from koopcli.stages import measured
@@ -80,9 +82,10 @@ def select(
             call.console.note("no bicycle beside it: that needs the signals v_x, yaw_rate and steer")
         call.console.note(f"the predictor: {predictor.record.name}")
         if report is not None:
-            from koopcli.reproduction.verdict import write_verdict
+            from koopcli.reproduction.verdict import verdict_page
 
-            write_verdict(report, call.pipeline, log, task, measured.scored(measured.chosen(log, selection), log))
+            score = measured.scored(measured.chosen(log, selection), log)
+            write_text(report, verdict_page(call.pipeline, log, task, score))
             call.console.note(f"wrote {report}")
         return {"chosen": predictor.record.name}
 

@@ -49,7 +49,7 @@ def select(sources: Sequence[Source], settings: Plot) -> Shown:
     measured = x[starts[:, np.newaxis] + np.arange(steps + 1)]
     predicted = forecasts(records["predictor"], x, u, starts, steps)
     band = np.concatenate([np.zeros((len(score.quantiles), 1, x.shape[1])), score.quantiles], axis=1)
-    time = score.dt * (np.arange(steps + 1) + np.arange(len(starts))[:, np.newaxis] * (1.25 * steps))
+    time = score.dt * (np.arange(steps + 1) + np.arange(len(starts))[:, np.newaxis] * (1.6 * steps))
     return Shown(time, measured, predicted, predicted + band[0], predicted + band[-1], score.state_channels)
 
 

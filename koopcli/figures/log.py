@@ -1,4 +1,4 @@
-"""A log: its signals over time, where it has gaps, and what was flagged in it."""
+"""A log: its signals over time in the units of its map, where it has gaps, and what was flagged in it."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from koopcli.figures.kit.style import (
 )
 from koopcli.logs.check import Check
 from koopcli.logs.imported import Log
+from koopcli.logs.units import unit
 from koopcli.records import Array, Episodes, FloatArray
 
 FIGURE = FigureKind(about="signals of a log, its gaps, and what was flagged", takes="log")
@@ -53,12 +54,14 @@ def select(sources: Sequence[Source], settings: Plot) -> Shown:
     episodes = log.episodes
     time, gaps = _laid_out(episodes)
     x, u = np.asarray(episodes.x[:]), np.asarray(episodes.u[:])
-    named = [*zip(episodes.state_channels.names, episodes.state_channels.units, x.T, strict=True)]
-    named += zip(episodes.input_channels.names, episodes.input_channels.units, u.T, strict=True)
+    names = (*episodes.state_channels.names, *episodes.input_channels.names)
+    si = (*episodes.state_channels.units, *episodes.input_channels.units)
+    units = {name: log.display.get(name, text) for name, text in zip(names, si, strict=True)}
+    columns = zip(names, np.hstack([x, u]).T, strict=True)
     return Shown(
         time,
-        {name: values for name, _, values in named},
-        {name: unit for name, unit, _ in named},
+        {name: values / unit(units[name]).factor for name, values in columns},
+        units,
         gaps,
         episodes.bounds[:-1].tolist(),
         [_words(check) for check in log.checks if check.verdict in ("warn", "ask")],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib.resources import files
-from pathlib import Path
 
 from koopcli import __version__
 from koopcli.config.experiment import load_experiment
@@ -23,8 +22,8 @@ CAPTIONS = {
 }
 
 
-def write_verdict(path: Path, pipeline: Pipeline, log: Task, selection: Task, score: Task) -> None:
-    """Write the page of a ``selection`` on a ``log``; ``score``: that of the chosen predictor there."""
+def verdict_page(pipeline: Pipeline, log: Task, selection: Task, score: Task) -> str:
+    """The page of a ``selection`` on a ``log``; ``score``: that of the chosen predictor there."""
     experiment = load_experiment("paper", {})
     made = pipeline.make(selection)
     pictures = []
@@ -40,11 +39,10 @@ def write_verdict(path: Path, pipeline: Pipeline, log: Task, selection: Task, sc
         f"</section></main><footer><p>koop {__version__}, {text(made.record.name)}</p></footer>",
     ]
     css = files("koopcli.reproduction").joinpath("page.css").read_text(encoding="utf-8")
-    path.write_text(
+    return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
-        f"<title>Verdict</title><style>{css}</style></head><body>{''.join(body)}</body></html>\n",
-        encoding="utf-8",
+        f"<title>Verdict</title><style>{css}</style></head><body>{''.join(body)}</body></html>\n"
     )
 
 

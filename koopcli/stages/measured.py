@@ -21,7 +21,7 @@ def selection(log: Task, settings: Select) -> Task:
 
 def chosen(log: Task, result: Selection) -> Task:
     """The predictor that was chosen, fitted to the whole ``log``."""
-    return fitted(fit_of(result.rungs[result.chosen]), log)
+    return fitted(fit_of(result.rungs[result.chosen], result.dt), log)
 
 
 def fitted(settings: FitEdmd, *logs: Task) -> Task:
@@ -32,7 +32,7 @@ def fitted(settings: FitEdmd, *logs: Task) -> Task:
 def scored(predictor: Task, log: Task) -> Task:
     """How well a ``predictor`` does on a ``log``, beside DMD with control of the same data."""
     training: Sequence[Task] = [task for role, task in predictor.inputs if role.endswith("trajectories")]
-    dmdc = fitted(fit_of(DMDC), *training)
+    dmdc = fitted(fit_of(DMDC, 1.0), *training)
     inputs = (("predictor", predictor), ("dmdc", dmdc), ("trajectories", log))
     return Task("score", OnLog(own=log in training), inputs)
 

@@ -46,6 +46,16 @@ def _run(settings: Predict, inputs: Inputs, context: Context) -> Forecast:
         raise InvalidValueError(
             f"the inputs have {u.shape[1]} columns, the predictor the inputs {predictor.input_channels}: one for each"
         )
+    low, high = predictor.coverage.domain
+    outside = [
+        f"{name} {value:g} (training {a:.3g} to {b:.3g})"
+        for name, value, a, b in zip(predictor.state_channels.names, settings.x0, low, high, strict=True)
+        if not a <= value <= b
+    ]
+    if outside:
+        context.warn(f"x0 lies outside the states of training: {', '.join(outside)}")
+    if not settings.u:
+        context.warn("no inputs are given: they are taken to be zero")
     if predictor.needs_history:
         context.warn(f"no history: as if it had stood so for {predictor.memory * predictor.dt:g} s")
     return from_state(predictor, np.array(settings.x0), u)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from koopcli.checks import build
 from koopcli.choices import setting
@@ -40,17 +40,24 @@ class Select:
         )
 
 
-def fit_of(rung: Rung) -> FitEdmd:
-    """The settings of ``fit-edmd`` that make the predictor of a ``rung`` on the whole log."""
-    terms = "products" if rung.products else "linear"
-    return FitEdmd.of(basis="total", order=rung.order, terms=terms, memory=rung.memory, increment_ridge=rung.ridge)
+def fit_of(rung: Rung, dt: float) -> FitEdmd:
+    """The settings of ``fit-edmd`` that make the predictor of a ``rung`` on a whole log with steps of ``dt`` s: its
+    memory is as many of them as are nearest.
+    """
+    terms, memory = "products" if rung.products else "linear", round(rung.past(dt) * dt, 9)
+    return FitEdmd.of(basis="total", order=rung.order, terms=terms, memory=memory, increment_ridge=rung.ridge)
 
 
 def _run(settings: Select, inputs: Inputs, context: Context) -> Selection:
     episodes = inputs["trajectories"].episodes
     laid_out(episodes, settings.rungs, settings.blocks)  # which refuses a log that is too short, once
     blocks = [Block.unpack(part) for part in context.chunks(settings.blocks, 1)]
-    return select(episodes, settings.rungs, settings.blocks, settings.bicycle, blocks)
+    selection = select(episodes, settings.rungs, settings.blocks, settings.bicycle, blocks)
+    asked = sorted({check.name.replace("_", " ") for check in inputs["trajectories"].checks if check.verdict == "ask"})
+    if asked:
+        doubt = f"The log is in doubt: koop import asks about {', '.join(asked)}."
+        selection = replace(selection, verdict=f"{selection.verdict} {doubt}")
+    return selection
 
 
 def _chunk(settings: Select, inputs: Inputs, rows: slice, progress: Progress) -> Packed:

@@ -158,6 +158,44 @@ def test_inputs_come_from_a_file(koop, log, folder):
     one_line(koop("predict", predictor, "--x0", "15,0", "--inputs", "u.csv"), 3, "a header with steer, torque")
 
 
+def test_inputs_have_the_units_of_their_header(koop, log, folder):
+    predictor = koop("fit-edmd", log).name
+    last = []
+    for header, steer in (("steer (deg)", 0.5), ("steer (rad)", np.radians(0.5)), ("steer", np.radians(0.5))):
+        Path("u.csv").write_text(f"{header},torque\n" + f"{steer},0\n" * 10, encoding="utf-8")
+        last.append(figures(koop("predict", predictor, "--x0", "15,0", "--inputs", "u.csv", "--json"))["last"])
+    assert last[0] == pytest.approx(last[1])
+    assert last[1] == last[2]
+
+
+def test_what_a_prediction_from_a_state_assumes_is_said(koop, log, folder):
+    predictor = koop("fit-edmd", log).name
+    done = koop("predict", predictor, "--x0", "200,0")
+    assert "x0 lies outside the states of training: v_x 200 (training" in done.err
+    assert "no inputs are given: they are taken to be zero" in done.err
+
+
+@pytest.mark.parametrize("dt", ["0.03", "0.07"])
+def test_a_period_that_does_not_divide_the_memory_is_selected_on_too(bring, koop, dt, folder):
+    log = bring(swap={"dt = 0.04": f"dt = {dt}"}).name
+    told = figures(koop("select", log, "--no-bicycle", "--json"))
+    predictor = koopcli.load(told["chosen"])
+    assert predictor.memory == round(0.2 / float(dt))
+
+
+def test_a_log_in_doubt_has_a_verdict_in_doubt(bring, koop, folder):
+    log = bring(swap={"sign = -1": "sign = 1"}).name
+    assert "koop import asks about" in figures(koop("select", log, "--no-bicycle", "--json"))["verdict"]
+
+
+def test_a_log_of_other_signals_is_refused_alike(bring, koop, log, folder):
+    predictor = koop("fit-edmd", log).name
+    other = bring(swap={"torque = {": "pull = {"}).name
+    told = "the predictor has the inputs steer (rad), torque (N m), the log steer (rad), pull (N m)"
+    one_line(koop("predict", predictor, "--from", other, "--at", "3"), 3, told)
+    one_line(koop("evaluate", predictor, "--on", other), 3, told)
+
+
 def test_what_makes_no_sense_is_refused(koop, log, folder):
     predictor = koop("fit-edmd", log).name
     one_line(koop("import", str(SIMULATED)), 2, "a map is needed")
@@ -170,6 +208,12 @@ def test_what_makes_no_sense_is_refused(koop, log, folder):
     one_line(koop("predict", predictor, "--x0", "15"), 3, "x0 has 1 numbers")
     one_line(koop("predict", predictor, "--x0", "15,a"), 3, "numbers with commas between them")
     one_line(koop("plot", "log"), 3, "name it")
+    assert koop("import", str(SIMULATED), "--suggest", "-o", "first.toml").code == 0
+    one_line(koop("import", str(SIMULATED), "--suggest", "-o", "first.toml"), 2, "is there already")
+    one_line(koop("import", str(SIMULATED), "--suggest", "-o", "no/first.toml"), 6, "cannot write no/first.toml")
+    one_line(koop("import", str(SIMULATED), "--suggest", "--map", "map.toml"), 2, "leave out --map")
+    one_line(koop("select", log, "--report", "no/verdict.html"), 6, "cannot write no/verdict.html")
+    one_line(koop("predict", predictor, "--from", log, "--at", "3", "--x0", "1,2"), 2, "choose one")
     one_line(koop("fit-edmd", log, "--terms", "bilinear"), 3, "multiply inputs with past states too")
     one_line(koop("fit-edmd", log, "--ridge", "1"), 3, "set fit-edmd.increment_ridge")
     one_line(koop("fit-edmd", log, "--memory", "0.05"), 3, "no whole number of steps of 0.04 s")

@@ -11,7 +11,7 @@ import numpy as np
 from koopcli.content import Content
 from koopcli.errors import InvalidValueError
 from koopcli.koopman.predictor.predictor import Predictor
-from koopcli.koopman.selection.score import forecasts
+from koopcli.koopman.selection.score import check_alike, forecasts
 from koopcli.records import Array, Channels, Episodes, FloatArray, Meta, Packed
 
 SCORED = 1.0  # s: what a selection judges
@@ -101,6 +101,7 @@ def from_log(
 
     Raises ``InvalidValueError`` for a time without a row, and where an episode is too short before or after it.
     """
+    check_alike(predictor, episodes)
     row, first, last = _row_at(episodes, at, run)
     if row - first < predictor.memory:
         raise InvalidValueError(

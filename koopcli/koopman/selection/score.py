@@ -100,7 +100,7 @@ def score(
 
     Raises ``InvalidValueError`` for other states, inputs or periods than the predictor's, and without any window.
     """
-    _check_alike(predictor, episodes)
+    check_alike(predictor, episodes)
     x, u = np.asarray(episodes.x[...], dtype=float), np.asarray(episodes.u[...], dtype=float)
     windows = Windows.of(episodes.dt, predictor.memory * episodes.dt)
     starts = windows.starts(pieces_of(episodes), OUTER)
@@ -147,7 +147,8 @@ def forecasts(predictor: Predictor, x: FloatArray, u: FloatArray, starts: IndexA
     return predictor.predict(x[starts], inputs, history=history)
 
 
-def _check_alike(predictor: Predictor, episodes: Episodes) -> None:
+def check_alike(predictor: Predictor, episodes: Episodes) -> None:
+    """Raise ``InvalidValueError`` for episodes of other states, inputs or another period than the predictor's."""
     for what, mine, theirs in (
         ("states", predictor.state_channels, episodes.state_channels),
         ("inputs", predictor.input_channels, episodes.input_channels),

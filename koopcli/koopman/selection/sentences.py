@@ -48,14 +48,24 @@ def _state(selection: Selection, i: int, known: bool) -> str:
     to_hold = _by_state(selection, HOLD)[i]
     if not known:
         why = "no better than holding it" if to_hold >= NEAR_HOLD else "no better than its mean"
-        return f"{name} not predicted, {why}" + (": nothing among the inputs drives it" if _idle(selection, i) else "")
+        return f"{name} not predicted, {why}" + (f": {_undriven(selection, name)}" if _idle(selection, i) else "")
     step = selection.judged[SHOWN]
     error = selection.pooled(CHOSEN)[step, i]
     low, high = (bound[step, i] for bound in selection.span(CHOSEN))
     text = f"{name} within {_short(error)} {unit} at {HORIZONS[SHOWN]:g} s ({_short(low)} to {_short(high)} over "
     text += f"{len(selection.windows)} blocks), {_short(1 / to_hold)} times better than holding"
     share = f", though the mean inputs explain {100 * selection.gain[i]:.0f} % of its change"
-    return text + (share if selection.gain[i] < DRIVEN else "")
+    return text + (share if selection.gain[i] < DRIVEN and len(selection.input_channels) else "")
+
+
+def _steered(selection: Selection, name: str) -> bool:
+    """Whether a state is one that steer moves, however little of it the means of inputs explain."""
+    return name in ("v_y", "yaw_rate") and "steer" in selection.input_channels.names
+
+
+def _undriven(selection: Selection, name: str) -> str:
+    steered = _steered(selection, name)
+    return "the mean inputs explain little of its change" if steered else "nothing among the inputs drives it"
 
 
 def _idle(selection: Selection, i: int) -> bool:
@@ -65,7 +75,8 @@ def _idle(selection: Selection, i: int) -> bool:
 
 def _against(selection: Selection) -> str:
     ratio, blocks = selection.ratio(CHOSEN, DMDC_ROW), selection.block_ratios(CHOSEN, DMDC_ROW)
-    text = f"Errors are {ratio:.2f} times those of DMDc ({blocks.min():.2f} to {blocks.max():.2f} over the blocks)"
+    better = "DMDc, without memory and products, is better here: errors" if ratio > 1 else "Errors"
+    text = f"{better} are {ratio:.2f} times those of DMDc ({blocks.min():.2f} to {blocks.max():.2f} block by block)"
     if BICYCLE in selection.models:
         text += f" and {selection.ratio(CHOSEN, BICYCLE):.2f} times those of a bicycle identified from the same rows"
     return f"{text}."
@@ -79,7 +90,8 @@ def _reserves(selection: Selection) -> list[str]:
     if selection.outside_share > OUTSIDE:
         said.append(f"{100 * selection.outside_share:.0f} % of the held-out rows lie outside the training states.")
     if selection.limited_share > LIMITED:
-        said.append(f"In {100 * selection.limited_share:.0f} % of them an input is limited to its training range.")
+        share = f"{100 * selection.limited_share:.0f} % of the held-out rows"
+        said.append(f"In {share} an input is limited to its training range.")
     return said
 
 
@@ -90,11 +102,14 @@ def _advice(selection: Selection, predicted: list[bool]) -> list[str]:
         if math.isnan(use):
             said.append(f"{name} never moves: record drives in which it does.")
         elif use > USED:
-            times = "only there" if math.isinf(use) else f"{_short(use)} times as far as in all others"
-            said.append(f"{name} is hardly used: in one block it moves {times}; record more of it.")
-    for i, name in enumerate(selection.state_channels.names):
-        if not predicted[i] and _idle(selection, i):
-            said.append(f"Record what drives {name} as an input, or make {name} an input.")
+            far = f"in one block it moves {_short(use)} times as far as in all others"
+            far = "it moves in one block alone" if math.isinf(use) else far
+            said.append(f"{name} is hardly used: {far}; record more.")
+    names = enumerate(selection.state_channels.names)
+    idle = [name for i, name in names if not predicted[i] and _idle(selection, i) and not _steered(selection, name)]
+    if idle:
+        listed, them = " and ".join(idle), "it an input" if len(idle) == 1 else "them inputs"
+        said.append(f"Record what drives {listed}, or make {them}.")
     return said
 
 

@@ -80,7 +80,7 @@ def test_white_noise_is_not_predicted() -> None:
     noise = np.random.default_rng(3).normal(size=(2400, 2))
     verdict = select(log(noise, smooth_inputs(2400, 1, 4))).verdict
     assert verdict.startswith("No: x0 not predicted, no better than its mean: nothing among the inputs drives it")
-    assert "Record what drives x1 as an input, or make x1 an input." in verdict
+    assert "Record what drives x0 and x1, or make them inputs." in verdict
 
 
 def test_a_random_walk_is_not_predicted() -> None:
