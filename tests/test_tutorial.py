@@ -59,6 +59,7 @@ def told(koop, folder):
     return follow, printed
 
 
+@pytest.mark.slow  # ten seconds of commands, which other tests run in small
 def test_commands_print_what_is_shown(told):
     follow, printed = told
     for block in BLOCKS:

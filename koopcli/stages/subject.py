@@ -20,7 +20,8 @@ def subject(artefacts: Sequence[Task], simulated: Callable[[Task], Simulate]) ->
 
     ``simulated`` finds the simulation behind a predictor whose trajectories are gone.
     """
-    steps = list(dict.fromkeys(step for task in artefacts for step in task.upstream()))
+    drawn = [task.input("predictor") if task.stage == "score" else task for task in artefacts]
+    steps = list(dict.fromkeys(step for task in drawn for step in task.upstream()))
     predictors = [step for step in steps if step.stage in FITS]
     vehicles = dict.fromkeys(_simulations(steps, predictors, simulated)) or dict.fromkeys(_samples(steps))
     return Subject(tuple(vehicles), tuple(outlook(predictor).name for predictor in predictors))
