@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
 from koopcli.errors import InvalidValueError
+from koopcli.logs.dates import DateError, seconds_of
 from koopcli.logs.entries import Source
 from koopcli.logs.formats.table import Table
 from koopcli.logs.units import known, unit
 from koopcli.records import FloatArray, IndexArray
-
-FINER = re.compile(r"(\.\d{6})\d+")  # than microseconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,14 +108,11 @@ def place_in(table: Table) -> Callable[[int], str]:
 
 def _dates(table: Table, column: int, layout: str) -> FloatArray:
     assert table.words is not None
-    seconds = []
-    for row, text in enumerate(table.words(column)):
-        try:
-            moment = datetime.strptime(FINER.sub(r"\1", text), layout)
-        except ValueError:
-            raise InvalidValueError(
-                f"{place_in(table)(row)}: the time '{text[:40]}' is not written as '{layout}': mend format in the map"
-            ) from None
-        moment = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
-        seconds.append(moment.timestamp())
-    return np.array(seconds)
+    texts = table.words(column)
+    try:
+        return seconds_of(texts, layout)
+    except DateError as error:
+        raise InvalidValueError(
+            f"{place_in(table)(error.row)}: the time '{texts[error.row][:40]}' is not written as '{layout}': mend "
+            "format in the map"
+        ) from None

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 
 from koopcli.errors import InvalidValueError
+from koopcli.logs.dates import DateError, seconds_of
 from koopcli.logs.formats import open_table
 from koopcli.logs.formats.table import Table
 from koopcli.logs.quantities import unit_in, words_of
@@ -59,10 +59,10 @@ def numbers(table: Table, place: int) -> FloatArray | None:
     return finite if len(finite) > 1 else None
 
 
-def clock_of(table: Table, path: Path, beside: Sequence[Path], taken: set[int]) -> Clock | None:
+def clock_of(table: Table, path: Path, beside: Sequence[Path], taken: set[int], inside: bool = False) -> Clock | None:
     """The clock of the file at ``path``, None where there is no time; ``taken`` gains the columns that it takes.
 
-    ``beside``: all files of the log, one of which may hold the time.
+    ``beside``: all files of the log, one of which may hold the time; ``inside``: whether the map names its folder.
     """
     if table.stamps is not None:
         return Clock("", _without_leftover(table.stamps(0)))
@@ -80,7 +80,7 @@ def clock_of(table: Table, path: Path, beside: Sequence[Path], taken: set[int]) 
         if clock is not None:
             taken.update({place, *named})
             return clock
-    return _beside(table, path, beside)
+    return _beside(path, beside, inside)
 
 
 def _clock_of(table: Table, place: int, named: bool) -> Clock | None:
@@ -89,7 +89,7 @@ def _clock_of(table: Table, place: int, named: bool) -> Clock | None:
     column = json.dumps(name, ensure_ascii=False) if name and table.names.count(name) == 1 else str(place)
     values = numbers(table, place)
     if values is None:
-        return _written(table, place, column) if named else None
+        return _written(table, place, column)
     stamps = _without_leftover(values)
     steps = np.diff(stamps)
     if not len(steps) or (steps < 0).any() or (steps > 0).mean() < (0.02 if named else 0.98):
@@ -119,15 +119,14 @@ def _written(table: Table, place: int, column: str) -> Clock | None:
     words = table.words(place) if table.words is not None else []
     for pattern in FORMATS if len(words) > 1 else ():
         try:
-            dates = [datetime.strptime(word, pattern) for word in words]
-        except ValueError:
+            stamps = seconds_of(words, pattern)
+        except DateError:
             continue
-        stamps = np.array([(date - dates[0]).total_seconds() for date in dates])
-        return Clock(f'{{ column = {column}, format = "{pattern}" }}', _without_leftover(stamps))
+        return Clock(f'{{ column = {column}, format = "{pattern}" }}', _without_leftover(stamps - stamps[0]))
     return None
 
 
-def _beside(table: Table, path: Path, beside: Sequence[Path]) -> Clock | None:
+def _beside(path: Path, beside: Sequence[Path], inside: bool) -> Clock | None:
     """The clock of a file that lies beside and is named after the time."""
     for other in beside:
         if other.parent != path.parent or other == path or other.stem.lower() not in TIMES:
@@ -137,7 +136,7 @@ def _beside(table: Table, path: Path, beside: Sequence[Path]) -> Clock | None:
             continue
         stamps = _without_leftover(values)
         written = _unit_of_times(stamps)
-        ending = json.dumps(f"{other.parent.name}/{other.name}", ensure_ascii=False)
+        ending = json.dumps(f"{other.parent.name}/{other.name}" if inside else other.name, ensure_ascii=False)
         said = "" if written == "s" else f', unit = "{written}"'
         return Clock(f"{{ file = {ending}{said} }}", stamps * unit(written).factor)
     return None

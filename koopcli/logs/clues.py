@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +19,7 @@ from koopcli.logs.quantities import COMMANDS, Quantity, quantity_of, unit_by_mag
 from koopcli.logs.units import known, unit
 from koopcli.records import FloatArray
 
+PRESSURE = frozenset(("pressure", "p", "pbrake"))
 GENERIC = TIMES | {"value", "values", "data", "log", "samples"}
 IDLE = 0.02  # of the largest magnitude
 
@@ -27,7 +29,7 @@ class Clue:
     """A column that seems to be a ``quantity``: where it is, its ``unit`` and whether that was guessed.
 
     ``beside``: how many words its name has that do not say so; ``largest``: 99.9 % of its magnitude, as logged;
-    ``idle``: the share of rows below ``IDLE`` of that.
+    ``idle``: the share of rows below ``IDLE`` of that; ``settled``: whether other columns agree with the unit.
     """
 
     quantity: Quantity
@@ -39,6 +41,7 @@ class Clue:
     beside: int
     largest: float
     idle: float
+    settled: bool = False
 
     @property
     def magnitude(self) -> float:
@@ -65,11 +68,12 @@ def look_at(path: Path, beside: Sequence[Path]) -> FileClues:
     Raises ``InvalidValueError`` for a file that cannot be read.
     """
     table = open_table(path)
-    name = path.parent.name if path.stem.lower() in GENERIC and path.parent.name else path.stem
-    ending = f"{path.parent.name}/{path.name}" if name == path.parent.name else path.name
+    inside = path.stem.lower() in GENERIC and bool(path.parent.name) and not _in_runs(path, beside)
+    name = path.parent.name if inside else path.stem
+    ending = f"{path.parent.name}/{path.name}" if inside else path.name
     source = "_".join(words_of(name)) or "log"
     taken: set[int] = set()
-    clock = clock_of(table, path, beside, taken)
+    clock = clock_of(table, path, beside, taken, inside)
     clues = FileClues(path, source, ending, table, clock)
     commanded = bool(set(words_of(name)) & set(COMMANDS.split()))
     meanings = {}
@@ -91,6 +95,13 @@ def look_at(path: Path, beside: Sequence[Path]) -> FileClues:
     return clues
 
 
+def _in_runs(path: Path, beside: Sequence[Path]) -> bool:
+    """Whether a file lies in one of several folders whose names differ in numbers alone, each with such a file."""
+    bare = re.sub(r"\d+", "", path.parent.name)
+    alike = {other.parent for other in beside if other.name == path.name}
+    return len([folder for folder in alike if re.sub(r"\d+", "", folder.name) == bare != folder.name]) > 1
+
+
 def _meaning(title: str) -> tuple[Quantity, int] | None:
     """What a column's title means: as a whole, or by what follows its last ``/`` or point, whichever is surer."""
     parts = (title, title.rpartition("/")[2], title.rpartition(".")[2])
@@ -106,12 +117,13 @@ def _clue(clues: FileClues, place: int, title: str, quantity: Quantity, beside: 
     if stated and unit(stated).si != quantity.unit and quantity.kind != "input":
         return None
     name = table.names[place]
+    wanted = "Pa" if quantity.name == "brake" and PRESSURE & set(words_of(title)) else quantity.unit
     return Clue(
         quantity,
         clues.source,
         column=name if name and table.names.count(name) == 1 else place,
         title=title,
-        unit=unit(stated).name if stated else unit_by_magnitude(quantity.unit, largest),
+        unit=unit(stated).name if stated else unit_by_magnitude(wanted, largest),
         guessed=not stated,
         beside=beside,
         largest=largest,

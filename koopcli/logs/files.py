@@ -94,7 +94,10 @@ def _files(path: Path) -> list[Path]:
 
 
 def _matches(ending: str, files: Sequence[Path]) -> dict[Path, str]:
-    """The files whose paths end so, each with what stands before that."""
+    """The files whose paths end so, each with what stands before that.
+
+    Whole parts of a path count, or patterns of them; of an ending that begins with a mark, such as ``.csv``, any end.
+    """
     if not ending:
         data = [f for f in files if f.suffix.casefold() not in NO_DATA and f.stem.casefold() not in NO_DATA_NAMES]
         return {file: str(file) for file in data}
@@ -104,7 +107,9 @@ def _matches(ending: str, files: Sequence[Path]) -> dict[Path, str]:
         end = file.parts[-len(wanted) :]
         if len(end) == len(wanted) and all(fnmatchcase(part, wish) for part, wish in zip(end, wanted, strict=True)):
             exact[file] = str(Path(*file.parts[: -len(wanted)]))
-    return exact or {file: str(file).removesuffix(ending) for file in files if str(file).endswith(ending)}
+    if exact or wanted[0][0].isalnum():
+        return exact
+    return {file: str(file).removesuffix(ending) for file in files if str(file).endswith(ending)}
 
 
 def _grouped(matches: Mapping[str, Mapping[Path, str]]) -> dict[str, dict[str, Path]]:

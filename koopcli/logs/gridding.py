@@ -45,7 +45,10 @@ class Gridded:
 
 
 def gridded(channels: dict[str, Channel], log_map: LogMap, dt: float) -> Gridded:
-    """The ``channels`` of a run, by the names in the map, every ``dt`` s. Channels are taken out once they are used."""
+    """The ``channels`` of a run, by the names in the map, every ``dt`` s. Channels are taken out once they are used.
+
+    None is left, so that memory does not hold what was put onto the grid.
+    """
     grid = grid_of(list(channels.values()), dt)
     gap = max(log_map.gap, SHARE * dt)
     kept, flagged = np.ones(len(grid), dtype=bool), np.zeros(len(grid), dtype=bool)
@@ -61,6 +64,7 @@ def gridded(channels: dict[str, Channel], log_map: LogMap, dt: float) -> Gridded
     least = max(2, int(np.ceil(log_map.shortest / dt - 1e-6)) + 1)
     slices, short = stretches(kept, least)
     x, u = _values(grid, slices, channels, log_map, dt)
+    channels.clear()
     flagged = np.concatenate([flagged[part] for part in slices]) if slices else flagged[:0]
     lengths = [part.stop - part.start for part in slices]
     starts = [float(grid[part.start]) for part in slices]

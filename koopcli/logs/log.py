@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,17 +12,19 @@ from koopcli.errors import InvalidValueError
 from koopcli.logs.entries import LogMap
 from koopcli.logs.files import Run, expand, runs_of, unused
 from koopcli.logs.gridding import Gridded, gridded, roles
+from koopcli.logs.hints import Said
 from koopcli.logs.imported import Log
 from koopcli.logs.plausible import checks_of
 from koopcli.logs.recording import Recording, recording_of, units_of
 from koopcli.logs.resample import sensible_step
-from koopcli.logs.timing import time_checks
+from koopcli.logs.timing import check_steps, slow_checks, state_steps, time_checks
 from koopcli.logs.units import known, unit
 from koopcli.progress import Progress, silent
 from koopcli.records import Channels, Episodes, FloatArray
 
 __all__ = ["Log", "expand", "import_log"]
 
+BRIEF = 5.0  # s: no log is so short
 LISTED = 5  # names in one note
 
 
@@ -36,22 +39,40 @@ def import_log(files: Sequence[Path], log_map: LogMap, progress: Progress = sile
     done = iter(range(1, total + 1))
     recordings: list[Recording] = []
     parts: list[Gridded] = []
+    steps: list[Mapping[str, float]] = []
+    digests: dict[tuple[bytes, ...], Run] = {}
+    notes: list[str] = []
     for run in runs:
-        recordings.append(recording_of(run, log_map, lambda: progress(next(done), total)))
+        recording = recording_of(run, log_map, lambda: progress(next(done), total))
+        digest = tuple(heard.digest for heard in recording.heard.values())
+        if digest in digests:
+            notes.append(f"run {_short(run)} holds the numbers of run {_short(digests[digest])}: left out")
+            continue
+        digests[digest] = run
+        recordings.append(recording)
+        _check_numbers(log_map, recording)
+        steps.append(state_steps(recording, log_map))
         if log_map.dt is not None and len(runs) > 1:
-            _check_numbers(log_map, recordings[-1:])
-            parts.append(gridded(recordings[-1].channels, log_map, log_map.dt))
+            check_steps(steps[-1], log_map, log_map.dt)
+            parts.append(gridded(recording.channels, log_map, log_map.dt))
     _check_columns(log_map, recordings)
     dt = _auto_step(log_map, recordings) if log_map.dt is None else log_map.dt
+    for each in steps:
+        check_steps(each, log_map, dt)
     parts = parts or [gridded(recording.channels, log_map, dt) for recording in recordings]
-    return _log(files, runs, recordings, parts, log_map, dt)
+    log = _log(list(digests.values()), recordings, parts, steps, log_map, dt)
+    return replace(log, notes=(*_unused(files, runs), *notes, *log.notes))
+
+
+def _short(run: Run) -> str:
+    return Path(run.name).name if run.name and not run.name.isdigit() else ", ".join(p.name for p in run.files.values())
 
 
 def _log(
-    files: Sequence[Path],
     runs: Sequence[Run],
     recordings: Sequence[Recording],
     parts: Sequence[Gridded],
+    steps: Sequence[Mapping[str, float]],
     log_map: LogMap,
     dt: float,
 ) -> Log:
@@ -73,13 +94,15 @@ def _log(
     )
     _check_constant(episodes)
     lengths_of = {signal.name: [s for part in parts for s in part.silent[signal.name]] for signal in log_map.signals}
-    checks = time_checks([recording.clocks for recording in recordings], dt, lengths_of)
+    checks = [*time_checks([recording.clocks for recording in recordings], dt, lengths_of), *slow_checks(steps, dt)]
+    said = Said({name: shown for name, (_, shown) in units.items()}, _ratio(log_map))
+    places = [{s.result: recording.heard[s.name].place for s in log_map.signals} for recording in recordings]
     return Log(
         episodes=episodes,
-        checks=(*checks, *checks_of(episodes, log_map.wheelbase)),
-        notes=tuple(_notes(files, runs, recordings, parts, log_map)),
+        checks=(*checks, *checks_of(episodes, log_map.wheelbase, said, places)),
+        notes=tuple(_notes(runs, recordings, parts, log_map)),
         wheelbase=log_map.wheelbase,
-        display={name: shown for name, (_, shown) in units.items()},
+        display=dict(said.units),
         flagged=np.concatenate([part.flagged for part in parts]),
     )
 
@@ -97,26 +120,24 @@ def _auto_step(log_map: LogMap, recordings: Sequence[Recording]) -> float:
     return sensible_step(max(steps))
 
 
-def _check_numbers(log_map: LogMap, recordings: Sequence[Recording]) -> None:
+def _check_numbers(log_map: LogMap, recording: Recording) -> None:
     for signal in log_map.signals:
-        for recording in recordings:
-            if len(recording.channels[signal.name].time) < 2:
-                raise InvalidValueError(
-                    f"{recording.heard[signal.name].place} ({signal.name}) holds fewer than two numbers: map another "
-                    "column, or leave that file out"
-                )
+        if len(recording.channels[signal.name].time) < 2:
+            raise InvalidValueError(
+                f"{recording.heard[signal.name].place} ({signal.name}) holds fewer than two numbers: map another "
+                "column, or leave that file out"
+            )
 
 
 def _check_columns(log_map: LogMap, recordings: Sequence[Recording]) -> None:
-    """No mapped column may be without numbers, constant, or a copy of another one."""
-    if any(recording.channels for recording in recordings):
-        _check_numbers(log_map, [recording for recording in recordings if recording.channels])
+    """No mapped column may be constant, or a copy of another one."""
     digests: dict[tuple[bytes, ...], str] = {}
     for signal in log_map.signals:
         heard = [recording.heard[signal.name] for recording in recordings]
         if min(each.low for each in heard) == max(each.high for each in heard):
             raise InvalidValueError(
-                f"{heard[0].place} ({signal.name}) is {heard[0].low:g} throughout: map a column that changes"
+                f"{heard[0].place} ({signal.name}) is {heard[0].low:g} throughout: map a column that changes, or "
+                "take it out of the map"
             )
         digest = tuple(each.digest for each in heard)
         if digest in digests and not signal.heading:
@@ -144,9 +165,10 @@ def _check_rows(
         )
     short = sum(part.short for part in parts)
     why = f", {short} shorter than log.shortest = {log_map.shortest:g} s" if short else ""
-    raise InvalidValueError(
-        f"no episode is left of {sum(p.shared for p in parts)} rows{why}: loosen keep, gap or shortest"
-    )
+    rows = sum(part.shared for part in parts)
+    longest = max(clock.time[-1] - clock.time[0] for recording in recordings for clock in recording.clocks.values())
+    timed = f"; the longest run lasts {longest:.3g} s: is the unit of its time right?" if longest < BRIEF else ""
+    raise InvalidValueError(f"no episode is left of {rows} rows{why}: loosen keep, gap or shortest{timed}")
 
 
 def _check_constant(episodes: Episodes) -> None:
@@ -158,19 +180,24 @@ def _check_constant(episodes: Episodes) -> None:
                 )
 
 
+def _ratio(log_map: LogMap) -> float:
+    """The ratio of the steering that the map says."""
+    return next((abs(signal.ratio) for signal in log_map.signals if signal.name == "steer"), 1.0)
+
+
+def _unused(files: Sequence[Path], runs: Sequence[Run]) -> list[str]:
+    others = unused(files, runs)
+    if not others:
+        return []
+    names = ", ".join("/".join(path.parts[-2:]) for path in others[:LISTED])
+    more = f" and {len(others) - LISTED} more" if len(others) > LISTED else ""
+    return [f"{len(others)} file{'s' * (len(others) > 1)} not in the map: {names}{more}"]
+
+
 def _notes(
-    files: Sequence[Path],
-    runs: Sequence[Run],
-    recordings: Sequence[Recording],
-    parts: Sequence[Gridded],
-    log_map: LogMap,
+    runs: Sequence[Run], recordings: Sequence[Recording], parts: Sequence[Gridded], log_map: LogMap
 ) -> list[str]:
     notes = []
-    others = unused(files, runs)
-    if others:
-        names = ", ".join("/".join(path.parts[-2:]) for path in others[:LISTED])
-        more = f" and {len(others) - LISTED} more" if len(others) > LISTED else ""
-        notes.append(f"{len(others)} file{'s' * (len(others) > 1)} not in the map: {names}{more}")
     short = sum(part.short for part in parts)
     if short:
         each = "stretches" if short > 1 else "stretch"

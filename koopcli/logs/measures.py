@@ -2,35 +2,72 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
+from koopcli.logs.check import Verdict
+from koopcli.logs.hints import Said
 from koopcli.records import Episodes, FloatArray, IntArray
 
 MOST = 99.9  # per cent of a magnitude: what is rarer may be a spike
 FEWEST = 20  # rows that a check needs
+TOLD = 0.6  # a correlation from which on a fit says something
+ISOLATED, REST = 2, 0.1  # rows: so far from a spike a signal is back, but for this share of it
+SPIKE = 30.0  # inter-decile ranges
 LAG_STEP = 0.01  # s, between the lags that are tried on finer grids
 
 
 @dataclass(frozen=True, eq=False)
+class Spike:
+    """The largest deviation of a signal from its median: its ``row``, its ``size`` in inter-decile ranges, and the
+    ``rows`` of all that are gone a few rows on.
+    """
+
+    row: int
+    size: float
+    rows: IntArray
+
+
+@dataclass(frozen=True, eq=False)
 class Measured:
-    """The signals of episodes by name, each (rows,), and which rows belong together; ``wheelbase`` in m, if known."""
+    """The signals of episodes by name, each (rows,), and which rows belong together; ``wheelbase`` in m, if known.
+
+    ``said``: what the map says. Spikes are interpolated over, and known as ``spikes``.
+    """
 
     episodes: Episodes
     wheelbase: float | None
+    said: Said = field(default_factory=Said)
 
     @cached_property
     def x(self) -> FloatArray:
         """The states, (rows, n_x)."""
-        return np.asarray(self.episodes.x[...], dtype=float)
+        return self._without_spikes(np.asarray(self.episodes.x[...], dtype=float), self.episodes.state_channels.names)
 
     @cached_property
     def u(self) -> FloatArray:
         """The inputs, (rows, n_u)."""
-        return np.asarray(self.episodes.u[...], dtype=float)
+        return self._without_spikes(np.asarray(self.episodes.u[...], dtype=float), self.episodes.input_channels.names)
+
+    @cached_property
+    def spikes(self) -> dict[str, Spike]:
+        """The largest deviation of each signal by name, of those with a range."""
+        both = (self.episodes.x, self.episodes.state_channels), (self.episodes.u, self.episodes.input_channels)
+        columns = {name: values[:, i] for values, channels in both for i, name in enumerate(channels.names)}
+        spikes = {name: spike_of(np.asarray(values, dtype=float)) for name, values in columns.items()}
+        return {name: spike for name, spike in spikes.items() if spike is not None}
+
+    def _without_spikes(self, values: FloatArray, names: Sequence[str]) -> FloatArray:
+        spiked = [i for i, name in enumerate(names) if name in self.spikes and len(self.spikes[name].rows)]
+        values = values.copy() if spiked else values
+        for i in spiked:
+            kept = np.setdiff1d(np.arange(len(values)), self.spikes[names[i]].rows)
+            values[:, i] = np.interp(np.arange(len(values)), kept, values[kept, i])
+        return values
 
     @property
     def dt(self) -> float:
@@ -59,10 +96,25 @@ class Measured:
         return rows[rows + steps < ends]
 
 
-def best_lag(log: Measured, first: FloatArray, second: FloatArray, longest: float) -> float:
-    """By how many s ``second`` (rows,) comes behind ``first`` (rows,) where they correlate best, whatever the sign.
+def spike_of(values: FloatArray) -> Spike | None:
+    """The largest deviation of ``values`` (rows,) from their median; None where most of them are one number."""
+    if len(values) < FEWEST:
+        return None
+    low, median, high = np.percentile(values, [10, 50, 90])
+    if not high > low:
+        return None
+    sizes = np.abs(values - median) / (high - low)
+    row = int(np.argmax(sizes))
+    tall = np.flatnonzero(sizes > SPIKE)
+    before, after = sizes[np.maximum(tall - ISOLATED, 0)], sizes[np.minimum(tall + ISOLATED, len(sizes) - 1)]
+    gone = np.maximum(before * (tall >= ISOLATED), after * (tall + ISOLATED < len(sizes))) < REST * sizes[tall]
+    return Spike(row, float(sizes[row]), tall[gone])
 
-    Lags of up to ``longest`` s either way are tried; of equal ones the shortest counts.
+
+def best_lag(log: Measured, first: FloatArray, second: FloatArray, longest: float) -> tuple[float, float]:
+    """By how many s ``second`` (rows,) comes behind ``first`` (rows,) where they correlate best, and how well they do.
+
+    The sign does not count. Lags of up to ``longest`` s either way are tried; of equal ones the shortest counts.
     """
     a, b = first - first.mean(), second - second.mean()
     stride = log.steps(LAG_STEP)
@@ -78,7 +130,7 @@ def best_lag(log: Measured, first: FloatArray, second: FloatArray, longest: floa
         correlation = abs(sums[0]) / np.sqrt(sums[1] * sums[2])
         if correlation > best:
             best, lag = correlation, shift * log.dt
-    return lag
+    return lag, float(best)
 
 
 def side_fit(v_y: FloatArray, r: FloatArray, v: FloatArray) -> tuple[float, float]:
@@ -86,6 +138,30 @@ def side_fit(v_y: FloatArray, r: FloatArray, v: FloatArray) -> tuple[float, floa
     columns = np.column_stack([r, r * v**2])
     weights = fit(columns, v_y)
     return float(weights[0]), correlation_of(columns @ weights, v_y)
+
+
+def slope_of(first: FloatArray, second: FloatArray) -> float:
+    """How many times ``second`` (n,) ``first`` (n,) is, with noise in both; nan where they do not go together."""
+    correlation = correlation_of(first, second)
+    return float(np.sign(correlation) * first.std() / second.std()) if abs(correlation) > TOLD else np.nan
+
+
+def spread(v: FloatArray, r: FloatArray) -> float:
+    """How far ``v`` (n,) lies from its mean, as a share of it, where the yaw rate ``r`` (n,) is large."""
+    if not r.any():
+        return 0.0
+    mean = np.average(v, weights=r**2)
+    return float(np.sqrt(np.average((v - mean) ** 2, weights=r**2)) / abs(mean))
+
+
+def above(value: float, warn: float, ask: float) -> Verdict:
+    """What a value means that should be small."""
+    return "ask" if value > ask else "warn" if value > warn else "ok"
+
+
+def below(value: float, warn: float, ask: float) -> Verdict:
+    """What a value means that should be large."""
+    return "ask" if value < ask else "warn" if value < warn else "ok"
 
 
 def correlation_of(a: FloatArray, b: FloatArray) -> float:

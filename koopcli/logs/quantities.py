@@ -6,9 +6,6 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-DEGREES, KMH = 57.3, 3.6  # of one in SI, as hints name them
-USUAL_WHEELBASE = 2.7  # m, where none is known
-RATIOS = (7.0, 26.0)  # of steerings
 CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 SUFFIXES = {  # endings of names, the longest first, and the units that they say
     "rad_per_s": "rad/s",
@@ -53,12 +50,16 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Limits:
-    """Between what a magnitude lies: the median where it is ``usual``, else 99.9 % of it; ``hint``: what mends it."""
+    """Between what a magnitude lies: the median where it is ``usual``, else 99.9 % of it.
+
+    ``other``: the unit that it may be in where it does not, ``factor`` times as large.
+    """
 
     low: float
     high: float
     unit: str
-    hint: str
+    other: str
+    factor: float
     usual: bool = False
 
 
@@ -97,8 +98,8 @@ QUANTITIES = (
         "rad/s",
         "state",
         "yaw_rate yawrate yaw_velocity yaw_vel yawvel yaw_speed wz w_z gyro_z gyroz gz omega_z omegaz rate_z rot_z "
-        "angular_velocity_z ang_vel_z angvel_z psi_dot psidot dpsi yaw_dot rotation_rate_z gyr_z angular_z r",
-        COMMANDS,
+        "angular_velocity_z ang_vel_z angvel_z psi_dot psidot dpsi yaw_dot rotation_rate_z gyr_z angular_z r omega",
+        f"wheel engine motor front rear fl fr rl rr x y {COMMANDS}",
     ),
     _quantity(
         "steer",
@@ -106,7 +107,7 @@ QUANTITIES = (
         "input",
         "steer steer_angle steering_angle steering_wheel_angle steer_wheel_angle road_wheel_angle delta swa steering "
         "str_ang steerangle steeringangle steering_position handwheel_angle handwheel wheel_angle sas_angle delta_f "
-        "steer_f servo",
+        "steer_f servo delta_wheel sw_pos sw_position sw_angle",
         "rate speed torque velocity",
     ),
     _quantity(
@@ -127,14 +128,24 @@ QUANTITIES = (
         "torque",
         "N m",
         "input",
-        "torque torques motor_torque drive_torque engine_torque wheel_torque trq m_drive axle_torque",
+        "torque torques motor_torque drive_torque engine_torque wheel_torque trq m_drive axle_torque twheel t_wheel",
         "steering steer brake",
     ),
     _quantity("v_command", "m/s", "input", "v_command speed_command speed_cmd cmd_speed target_speed v_ref v_cmd"),
     _quantity(
-        "a_x", "m/s²", None, "a_x ax acc_x accel_x acceleration_x longitudinal_acceleration linear_acceleration_x"
+        "a_x",
+        "m/s²",
+        None,
+        "a_x ax acc_x accel_x acceleration_x longitudinal_acceleration linear_acceleration_x long_acc long_accel "
+        "acc_long longitudinal_acc",
     ),
-    _quantity("a_y", "m/s²", None, "a_y ay acc_y accel_y acceleration_y lateral_acceleration linear_acceleration_y"),
+    _quantity(
+        "a_y",
+        "m/s²",
+        None,
+        "a_y ay acc_y accel_y acceleration_y lateral_acceleration linear_acceleration_y lat_acc lat_accel acc_lat "
+        "lateral_acc",
+    ),
     _quantity("a_z", "m/s²", None, "a_z az acc_z accel_z acceleration_z vertical_acceleration linear_acceleration_z"),
 )
 BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
@@ -145,38 +156,15 @@ UNITS_OF = {  # what a signal is logged in, and up to which magnitude a column o
     "1": (("1", 1.5), ("%", 110.0)),
     "m/s²": (("g", 1.6), ("m/s²", 300.0)),
     "N m": (("N m", 1e6),),
+    "Pa": (("bar", 300.0), ("kPa", 30_000.0), ("Pa", 1e9)),
 }
 LIMITS = {
-    "v_x": Limits(0.0, 120.0, "m/s", "is v_x in km/h: unit = 'km/h', factor 3.6?"),
-    "v_y": Limits(0.0, 60.0, "m/s", "is v_y in km/h: unit = 'km/h', factor 3.6?"),
-    "yaw_rate": Limits(0.0, 12.0, "rad/s", "is yaw_rate in deg/s: unit = 'deg/s', factor 57.3?"),
-    "steer": Limits(0.0, 13.0, "rad", "is steer in degrees: unit = 'deg', factor 57.3?"),
-    "a_z": Limits(5.0, 15.0, "m/s²", "is a_z in g: unit = 'g', factor 9.81?", usual=True),
+    "v_x": Limits(0.0, 120.0, "m/s", "km/h", 3.6),
+    "v_y": Limits(0.0, 60.0, "m/s", "km/h", 3.6),
+    "yaw_rate": Limits(0.0, 12.0, "rad/s", "deg/s", 57.3),
+    "steer": Limits(0.0, 13.0, "rad", "deg", 57.3),
+    "a_z": Limits(5.0, 15.0, "m/s²", "g", 9.81, usual=True),
 }
-FACTORS = (  # the wheelbase from the log over the true one, from and to, and what makes it so
-    (1 / DEGREES, 1 / DEGREES, "yaw_rate is 57.3 times too large (unit = 'deg/s'?) or steer too small (not in deg?)"),
-    (1 / KMH, 1 / KMH, "a road without curves pulls it down, or v_x is 3.6 times too small (not in km/h?)"),
-    (KMH, KMH, "v_x is 3.6 times too large (unit = 'km/h'?)"),
-    (*RATIOS, "steer is the angle of the steering wheel (ratio = {ratio:.3g}?)"),
-    (DEGREES, DEGREES, "steer is 57.3 times too large (unit = 'deg'?) or yaw_rate too small (not in deg/s?)"),
-    (
-        DEGREES * RATIOS[0],
-        DEGREES * RATIOS[1],
-        "steer is the angle of the steering wheel in degrees (unit = 'deg', ratio = {degrees:.3g}?)",
-    ),
-)
-NEAR = 1.8  # how far from a factor it is still worth a thought
-
-
-def factor_hint(ratio: float) -> str:
-    """What would mend a wheelbase that comes out ``ratio`` times as long as it is."""
-    if ratio <= 0:
-        return "steer or yaw_rate has the wrong sign: sign = -1 for one of them"
-    distances = [(max(low / ratio, ratio / high, 1.0), words) for low, high, words in FACTORS]
-    near = [words for distance, words in sorted(distances, key=lambda entry: entry[0]) if distance < NEAR]
-    if not near:
-        near = ["the units of steer, yaw_rate and v_x do not fit together ({ratio:.3g} times)"]
-    return ", or ".join(near).format(ratio=ratio, degrees=ratio / DEGREES)
 
 
 def words_of(name: str) -> tuple[str, ...]:

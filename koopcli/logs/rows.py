@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -17,6 +18,7 @@ from koopcli.errors import InvalidValueError
 from koopcli.progress import Progress, silent
 from koopcli.records import FloatArray
 
+DATE = re.compile(r"\d[-_:/.T]\d+[-_:/.T]\d")
 CHUNK = 20_000  # lines read at a time
 MISSING = frozenset(
     {"", "na", "n/a", "nan", "-nan", "+nan", "null", "none", "nil", "-", "--", "?", "nan(ind)", "-nan(ind)"}
@@ -209,9 +211,10 @@ def _row(path: Path, layout: TextLayout, columns: Sequence[int], line: int, text
             values.append(number(fields[column], layout.decimal))
         except ValueError:
             name = layout.names[column] if column < len(layout.names) and layout.names[column] else str(column)
+            text = fields[column][:40]
+            mending = "say its format in the map, if it is a time" if DATE.search(text) else "mend that line"
             raise InvalidValueError(
-                f"{path}, line {line}, column '{name}': '{fields[column][:40]}' is not a number: mend that line, or "
-                "map another column"
+                f"{path}, line {line}, column '{name}': '{text}' is not a number: {mending}, or map another column"
             ) from None
     return values
 

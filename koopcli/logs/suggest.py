@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from koopcli.errors import InvalidValueError
-from koopcli.logs.clockclues import TIMES, numbers
-from koopcli.logs.clues import Clue, FileClues, look_at
+from koopcli.logs.clockclues import numbers
+from koopcli.logs.clues import Clue, FileClues
 from koopcli.logs.entries import GAP
 from koopcli.logs.quantities import LIMITS, QUANTITIES, words_of
+from koopcli.logs.settle import settled
+from koopcli.logs.sourceclues import sources_of
 from koopcli.text import one_line
 
 STEPS = (0.04, 0.05, 0.1, 0.2, 0.5, 1.0)  # s: a finer grid predicts no better
@@ -21,10 +23,9 @@ SHOWN = 12  # names in one comment
 STANDING = 0.02  # share of rows; a car that stands obeys other equations
 SMALL_TOP = 10.0  # m/s, which a small car does not reach
 KEPT_ABOVE = (0.3, 1.0)  # m/s, for a small and for a large car
-NO_LOGS = frozenset((".md", ".toml", ".json", ".yaml", ".yml", ".png", ".jpg", ".pdf", ".py", ".m"))
 DRIVING = ("throttle", "brake", "torque", "v_command")
 CORNERS = frozenset(("fl", "fr", "rl", "rr", "front", "rear", "left", "right", "f", "r", "1", "2", "3", "4"))
-HAND_WHEEL = frozenset(("wheel", "swa", "handwheel", "sas", "hand"))
+HAND_WHEEL = frozenset(("wheel", "swa", "handwheel", "sas", "hand", "sw"))
 RATIO = 16  # of the steering of many cars
 
 
@@ -39,16 +40,17 @@ class Suggestion:
 def suggest(files: Sequence[Path]) -> Suggestion:
     """A first map for the log in ``files``, in which states, inputs and times are guessed.
 
-    Files of one name in different folders are taken for runs, of which the first is looked at. Raises
-    ``InvalidValueError`` where none of the files can be read.
+    Files of one name in different folders, and files of equal columns, are taken for runs, of which the first is
+    looked at. Raises ``InvalidValueError`` where none of the files can be read.
     """
     notes: list[str] = []
-    sources = _sources(files, notes)
+    sources = sources_of(files, notes)
     if not sources:
         raise InvalidValueError(
             f"no log in {len(files)} files: {notes[0] if notes else 'files with columns were expected'}"
         )
     states, inputs = _chosen(sources, notes)
+    states = settled(states, sources, notes)
     used = [file for file in sources if file.source in {clue.source for clue in (*states, *_flat(inputs))}]
     for file in sources:
         if used and file not in used:
@@ -62,39 +64,6 @@ def suggest(files: Sequence[Path]) -> Suggestion:
         lines += ["", *_source(file, notes)]
     lines += ["", "[states]", *_states(states, notes), "", "[inputs]", *_inputs(inputs, notes)]
     return Suggestion("\n".join(lines) + "\n", tuple(dict.fromkeys(notes)))
-
-
-def _sources(files: Sequence[Path], notes: list[str]) -> list[FileClues]:
-    """The clues of each file that is no other run of one before, and no time of another."""
-    folders: dict[Path, int] = {}
-    for path in files:
-        folders[path.parent] = folders.get(path.parent, 0) + 1
-    sources: dict[str, FileClues] = {}
-    runs: dict[str, int] = {}
-    for path in files:
-        if path.suffix.lower() in NO_LOGS or path.stem.lower() in ("license", "readme"):
-            continue
-        if path.stem.lower() in TIMES and folders[path.parent] > 1:
-            continue
-        try:
-            clues = look_at(path, files)
-        except InvalidValueError as error:
-            notes.append(one_line(str(error)))
-            continue
-        if clues.ending in (file.ending for file in sources.values()):
-            runs[clues.ending] = runs.get(clues.ending, 1) + 1
-            continue
-        name, count = clues.source, 2
-        while name in sources:
-            name, count = f"{clues.source}_{count}", count + 1
-        sources[name] = clues if name == clues.source else _renamed(clues, name)
-    notes += [f"{ending} is there {count} times: each is taken for a run" for ending, count in runs.items()]
-    return list(sources.values())
-
-
-def _renamed(clues: FileClues, name: str) -> FileClues:
-    renamed = [Clue(**{**vars(clue), "source": name}) for clue in clues.clues]
-    return FileClues(**{**vars(clues), "source": name, "clues": renamed})
 
 
 def _chosen(sources: Sequence[FileClues], notes: list[str]) -> tuple[list[Clue], list[list[Clue]]]:
@@ -127,8 +96,7 @@ def _rank(clue: Clue, order: Sequence[str]) -> int:
 
 def _bare(clue: Clue) -> tuple[str, ...]:
     """The words of a title without those of a corner of the car."""
-    words = clue.title.lower().replace("-", "_").replace(" ", "_").split("_")
-    return tuple(word for word in words if word not in CORNERS)
+    return tuple(word for word in words_of(clue.title) if word not in CORNERS)
 
 
 def _flat(inputs: Sequence[Sequence[Clue]]) -> list[Clue]:
@@ -182,7 +150,7 @@ def _source(file: FileClues, notes: list[str]) -> Iterator[str]:
     clock = file.clock
     if clock is None:
         yield "time = { rate = 100 }  # Hz: no time was found, say the rate"
-        notes.append(f"{file.ending} has no time: say its rate in the map")
+        notes.append(f"{file.path.name} has no time: say its rate in the map")
     elif clock.toml:
         yield f"time = {clock.toml}" + (f"  # {one_line(clock.doubt)}" if clock.doubt else "")
         if clock.doubt:
@@ -220,7 +188,7 @@ def _line(clue: Clue, clues: Sequence[Clue], notes: list[str]) -> str:
     else:
         where = f"column = {_quoted(clue.column)}"
     settings, doubts = "", []
-    if clue.guessed:
+    if clue.guessed and not clue.settled:
         doubts.append(f"unit guessed: up to {clue.largest:.3g}")
     if clue.beside:
         doubts.append("guessed from part of its name")
@@ -233,7 +201,7 @@ def _line(clue: Clue, clues: Sequence[Clue], notes: list[str]) -> str:
         doubts.append(f"the angle of the steering wheel? then its ratio, about {RATIO}")
     limits = LIMITS.get(name)
     if limits is not None and clue.magnitude > limits.high:
-        doubts.append(limits.hint)
+        doubts.append(f"is {name} in {limits.other}: unit = '{limits.other}'?")
     notes += [f"{name}, '{one_line(clue.title)}' of {clue.source}: {doubt}" for doubt in doubts]
     beside = f"  # {'; '.join(doubts)}" if doubts else ""
     return f'{name} = {{ source = "{clue.source}", {where}, unit = {_quoted(clue.unit)}{settings} }}{beside}'

@@ -68,7 +68,7 @@ def imported(files: Sequence[Path], log_map: LogMap) -> Task:
         named = {**run.files, **{f"{source} (time)": path for source, path in run.times.items()}}
         digests += [f"{i}/{source} {_digest(path)}" for source, path in sorted(named.items())]
     settings = Import(json.dumps(essential_map(log_map), sort_keys=True), tuple(digests))
-    _AT_HAND[settings] = files, log_map
+    _AT_HAND[settings] = [path.absolute() for path in files], log_map
     return Task(STAGE_NAME, settings)
 
 

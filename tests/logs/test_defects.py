@@ -33,6 +33,7 @@ def columns(path: Path) -> list[np.ndarray]:
     return table.read(range(len(table.names)))
 
 
+@pytest.mark.slow  # it is simulated again, in seconds
 @pytest.mark.parametrize("name", [defects.MOTION, defects.CONTROLS])
 def test_it_is_made_again_as_it_is_kept(driven, name):
     made, kept = (folder / name for folder in (driven[1], KEPT))
@@ -59,6 +60,7 @@ def test_every_defect_is_in_it():
     assert all(row[0] == row[-1] == '"' for row in rows[1:])
 
 
+@pytest.mark.slow  # as above
 def test_what_mends_it_gives_what_was_driven(driven):
     """The map's units, signs, ratio and offset bring back states and inputs, up to noise and rounding."""
     drive, _ = driven
@@ -76,6 +78,7 @@ def test_what_mends_it_gives_what_was_driven(driven):
     assert starts == pytest.approx(drive.starts)
 
 
+@pytest.mark.slow  # as above
 def test_the_import_with_its_map_is_what_was_driven(driven):
     """Four episodes, of which each row is that of the drive at that time, up to noise; no check has anything to say."""
     drive, _ = driven
@@ -101,6 +104,7 @@ def test_a_first_map_leaves_what_the_checks_then_name():
     assert "offset = -0.2" in checks["steer_yaw_lag"].hint
 
 
+@pytest.mark.slow  # as above
 def test_it_is_varied_enough_to_identify_from(driven):
     x, u = driven[0].x, driven[0].u
     lateral = np.abs(x[..., 0] * x[..., 2])

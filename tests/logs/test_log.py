@@ -176,6 +176,7 @@ def test_runs_are_never_joined(tmp_path: Path) -> None:
 def test_files_in_folders_belong_together_and_those_not_used_are_named(tmp_path: Path) -> None:
     columns = drive()
     for run in ("a", "b"):
+        columns["d"] = 1.1 * columns["d"]
         for name, pick in (("car", ("t", "v", "r")), ("steer", ("t", "d"))):
             write(tmp_path / run / f"{name}.csv", {key: columns[key] for key in pick})
     write(tmp_path / "b" / "other.csv", columns)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from koopcli.logs.check import Check
+from koopcli.logs.hints import factor_hint
 from koopcli.logs.plausible import checks_of
-from koopcli.logs.quantities import factor_hint
 from koopcli.records import Channels, Episodes
 
 SIMULATED = Path(__file__).parents[2] / "data/logs/simulated"
@@ -209,7 +209,7 @@ def test_what_is_missing_constant_or_short_is_not_checked():
     names = {c.name for c in checks_of(episodes_of({"v_x": still, "v_y": still, "yaw_rate": still}, {"steer": still}))}
     assert names == {"lateral_acceleration", "longitudinal_acceleration", "unchanged", "magnitude"}
     assert checks_of(episodes_of({"v_x": still[:5], "yaw_rate": still[:5]}, {"steer": still[:5]})) == []
-    assert {c.name for c in checks_of(episodes_of({"a": smooth(100, 1)}, {}))} == {"unchanged", "noise"}
+    assert {c.name for c in checks_of(episodes_of({"a": smooth(100, 1)}, {}))} == {"spike", "unchanged", "noise"}
 
 
 @pytest.fixture(scope="module")
