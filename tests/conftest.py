@@ -32,7 +32,7 @@ from tests import stock
 settings.register_profile("any load", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any load")
 
-OF_LOGS = {"import", "select", "predict"}  # commands that take no experiment
+OF_LOGS = {"import", "select", "predict", "control"}  # commands that take no experiment
 TINY = """
 [sample.grid]
 count = 5
@@ -65,6 +65,7 @@ seeds = [0, 1]
 cuts = [1e-8]
 mu_scales = [2.0]
 unseen = ["bmw-320i"]
+noises = [0.1]
 pairs = [2, 4]
 budgets = [30.0, 20.0]
 """

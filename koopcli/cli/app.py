@@ -22,6 +22,7 @@ COMMANDS = (
     Entry("import", "importing", OWN, "Bring in a log of your own car, with checks of its units, signs and clocks."),
     Entry("select", "selecting", OWN, "Choose a predictor of a log and say whether it is worth having."),
     Entry("predict", "predicting", OWN, "Predict from a state of a log, or from one that is given."),
+    Entry("control", "controlling", MAKE, "Drive a scenario in a closed loop: recover from a spin, change lanes."),
     Entry("sample", "making", MAKE, "Draw or lay out initial states and inputs."),
     Entry("simulate", "making", MAKE, "Simulate trajectories of a vehicle from a sample."),
     Entry(

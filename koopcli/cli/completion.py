@@ -15,7 +15,7 @@ from koopcli.figures import NAMES, module_of
 
 STAGES = (
     *("sample", "simulate", "import", "fit-edmd", "fit-eigen", "baseline"),
-    *("evaluate", "select", "score", "predict", "sweep", "plot"),
+    *("evaluate", "select", "score", "predict", "control", "sweep", "plot"),
 )  # heavy to ask for
 
 

@@ -34,9 +34,11 @@ if TYPE_CHECKING:
     from koopcli.stages.pipeline import Artefact
 
 FITS = ("experiment", "fit-edmd", "fit-eigen")  # the sections that choose and make a predictor
+OF_SCORES = ("restart", "input_matrix", "every")  # settings of evaluate, the others are of test samples
+ASKED = ("excitation", "amplitude", "grip_share", "hold", "count", "steps", "seed", *OF_SCORES)
 
 
-@options_of(*KINDS["test"].values(), Evaluate, only=("excitation", "amplitude", "count", "steps", "seed", "restart"))
+@options_of(*KINDS["test"].values(), Evaluate, only=ASKED)
 def evaluate(
     context: typer.Context,
     predictor: Annotated[
@@ -64,17 +66,20 @@ def evaluate(
     """Score a predictor on test trajectories of its own plant and vehicle: RMSE, re-lifted RMSE, largest errors.
 
     The plant names the test set: a box of states with inputs for forces, the states inside Γ without inputs for slips,
-    cars under way with torques and steer for wheels.
+    cars under way with torques and steer for wheels. A predictor of slips with force inputs (fit-eigen --inputs forces)
+    is tested from the states inside Γ under changes of axle forces, and may be asked with another --input-matrix than
+    it was fitted with.
     An interrupted evaluation goes on where it stopped. The predictor is compared with three baselines: the first state
     held, the plant linearised there, and a linear model of the same data. Where one of them is better, the last line
     says why and what to type.
 
     Example: koop evaluate --experiment best-edmd --vehicle bmw-320i
     """
-    scored = {name: given.pop(name) for name in ("restart",) if name in given}
+    scored = {name: given.pop(name) for name in OF_SCORES if name in given}
     changes: Changes = {"test": given, "evaluate": scored, "vehicle": {"name": vehicle}}
     call = begin(store, experiment, set_, (*DATA, *FITS, *TEST), changes, workers, cluster)
     from koopcli.stages import fits, recipes
+    from koopcli.stages.asked import tested_on
     from koopcli.stages.verdict import beside
 
     of = call.optional(predictor, tuple(fits.FITS), "the PREDICTOR", TEST)
@@ -96,7 +101,9 @@ def evaluate(
         return
 
     def evaluation(experiment: Experiment) -> Task:
-        on = recipes.test_set(experiment, call.simulated(of)) if of is not None and test is None else test
+        on = (
+            recipes.test_set(experiment, tested_on(of, call.simulated(of))) if of is not None and test is None else test
+        )
         return recipes.evaluation(experiment, of, on)
 
     task = evaluation(call.experiment)

@@ -40,7 +40,8 @@ def fit_eigen(
 
     The trajectories start on a surface Γ of one kinetic energy (kind ellipsoid) and never return to it. Along each of
     them an eigenfunction grows as exp(rate · time) from its value on Γ; a new state takes the values of the nearest
-    sample. Inputs have no effect on the prediction.
+    sample. Inputs have no effect on the prediction, but for changes of axle forces, with --inputs forces: these act
+    through the derivative of the lift, and nothing is fitted to them.
 
     That is the paper's predictor. The experiment best-eigen has the best one: initial states in the volume (kind
     greedy), a comb of rates, lifted states fitted to the horizon ahead, splines in world coordinates, looked up a

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from koopcli.choices import SEED_LIMIT, setting, taken_from
+from koopcli.koopman.predictor.dynamics.force_driven import InputMatrix
 from koopcli.simulation.samples.sample import LARGEST, Excitation
 from koopcli.vehicles.parameters import VehicleParameters
 from koopcli.vehicles.plants.plant import PlantChoice
@@ -102,6 +103,18 @@ class Evaluate:
         option=True,
         help="start the prediction afresh from the true state every so many steps, and score each stretch; of a "
         "predictor driven by forces the test set is then the paper's trajectory under random inputs (kind point)",
+    )
+    input_matrix: InputMatrix | None = setting(
+        None,
+        option=True,
+        help="where the derivative of the lift is taken of a predictor with force inputs; else as it was fitted",
+    )
+    every: int | None = setting(
+        None,
+        low=1,
+        high=1_000_000,
+        option=True,
+        help="samples after which it is taken again; else as it was fitted",
     )
 
 

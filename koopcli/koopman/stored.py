@@ -21,7 +21,7 @@ def _of_basis(unpack: Callable[[Packed], Observables]) -> UnpackLift:
 
 def _of_modes(unpack: Callable[[Packed, Modes], Observables]) -> UnpackLift:
     def table(packed: Packed, dynamics: Dynamics) -> Observables:
-        assert isinstance(dynamics, Diagonal), "a table is carried on by modes"
+        assert isinstance(dynamics, Diagonal), "a table is carried on by modes, with forces or without"
         return unpack(packed, dynamics.modes)
 
     return table

@@ -16,6 +16,7 @@ from koopcli.simulation.samples.ellipsoid import EllipsoidSample
 from koopcli.simulation.samples.greedy import GreedySample
 from koopcli.simulation.samples.grid import GridSample
 from koopcli.simulation.samples.sample import SampleChoice
+from koopcli.stages.asked import tested_on
 from koopcli.stages.base import Task
 from koopcli.stages.fits import LIFTED
 from koopcli.stages.roles import roles_of
@@ -88,7 +89,8 @@ def case_of(evaluation: Task, figures: Meta) -> Case | None:
     samples = [sample.settings for task in data if (sample := task.find("sample")) is not None]
     if predictor.stage not in LIFTED or not data or len(samples) < len(data) or tested is None:
         return None
-    mine, theirs = data[0].settings, test.settings
+    mine, theirs = tested_on(predictor, data[0].settings), test.settings
+    assert mine.plant is not None, "settled when it was simulated"
     return Case(
         plant=mine.plant.kind,
         fit=predictor.settings,

@@ -12,10 +12,13 @@ from koopcli.config.experiment import Experiment
 from koopcli.config.settings import FitName
 from koopcli.errors import KoopError
 from koopcli.figures.kit.registry import FIGURES
+from koopcli.koopman.predictor.dynamics.force_driven import STRETCHES
 from koopcli.simulation.samples.sample import SampleChoice
+from koopcli.stages.asked import forces_of
 from koopcli.stages.base import Task
 
 Plan = Callable[[Experiment], Sequence[Task]]
+FORCED = ("evaluate.input_matrix", "evaluate.every")  # how a predictor with force inputs is asked
 
 
 def why_idle(name: str, experiment: Experiment, plan: Plan, tasks: Sequence[Task]) -> str | None:
@@ -84,7 +87,7 @@ def _reason(name: str, tasks: Sequence[Task], steps: Sequence[Task]) -> str:
     used |= {"vehicle", "simulate"} if plants or any(taken(type(sample)) for sample in samples) else set()
     figure = tasks[0].settings.figure if tasks[0].stage == "plot" else ""
     own = samples if section in KINDS else [step.settings for step in steps if step.stage == section]
-    if of_choice := _unused_kind(section, key, own) or _chosen(section, key, own):
+    if of_choice := _unused_kind(section, key, own) or _chosen(section, key, own) or _unforced(name, tasks):
         return of_choice
     instead = f": {FIGURES[figure].instead}" if figure and FIGURES[figure].instead else ""
     if section not in used:
@@ -99,6 +102,16 @@ def _reason(name: str, tasks: Sequence[Task], steps: Sequence[Task]) -> str:
         names = " and ".join(taken(type(samples[0])))
         return f"a sample of kind '{samples[0].kind}' takes {names} of the vehicle alone"
     return f"the figure '{figure}' draws nothing of it{instead}" if figure else "the same is made without it"
+
+
+def _unforced(name: str, tasks: Sequence[Task]) -> str:
+    """Why an evaluation has no use for how a predictor with force inputs is asked; nothing of other settings."""
+    scored = [step.input("predictor") for task in tasks for step in task.upstream() if step.stage == "evaluate"]
+    if name not in FORCED or not scored:
+        return ""
+    if not any(forces_of(predictor) for predictor in scored):
+        return "the predictor has no force inputs: fit with fit-eigen.inputs=forces"
+    return f"only an input matrix of {' or '.join(STRETCHES)} has a use for it"
 
 
 def _unused_kind(section: str, key: str, used: Sequence[Any]) -> str:

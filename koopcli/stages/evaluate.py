@@ -14,15 +14,18 @@ from koopcli.koopman.predictor.predictor import check_horizon
 from koopcli.koopman.scores.evaluation import Evaluation, evaluate, join, shortest_prediction
 from koopcli.progress import Progress, within
 from koopcli.records import Meta, Packed
+from koopcli.stages.asked import as_asked, as_fitted, lifts, takes, tested_on
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task, refuse_beyond_memory
 from koopcli.stages.fits import outlook
 from koopcli.stages.roles import finished
+from koopcli.vehicles.plants.slips_axle_forces import driven
 
 SAMPLES = 500_000  # scored together, however long the trajectories of a chunk are
 
 
 def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
-    predictor, trajectories = inputs["predictor"], finished(inputs["trajectories"], context)
+    trajectories = finished(inputs["trajectories"], context)
+    predictor = as_asked(inputs["predictor"], settings, trajectories)
     result = join([Evaluation.unpack(part) for part in context.chunks(len(trajectories), settings.chunk)])
     figures, n = result.figures(), len(result.diverged)
     for name, what in (
@@ -39,7 +42,7 @@ def _run(settings: Evaluate, inputs: Inputs, context: Context) -> Evaluation:
         and any(np.asarray(trajectories.u[rows]).any() for rows in blocks(slice(0, len(trajectories)), settings.chunk))
     ):
         context.warn("the test trajectories have inputs, of which this predictor knows nothing")
-    if names := _differing(predictor.plant, trajectories.plant):
+    if names := _differing(driven(predictor.plant), driven(trajectories.plant)):
         context.warn(f"the test trajectories are of another vehicle or plant than the predictor: {', '.join(names)}")
     if figures["outside"]:
         context.warn(
@@ -53,12 +56,10 @@ def _chunk(settings: Evaluate, inputs: Inputs, rows: slice, progress: Progress) 
     trajectories = inputs["trajectories"].finished()
     assert settings.first is not None, "settled from the plant"
     assert settings.relift is not None, "settled from the predictor"
-    parts = []
+    predictor, parts = as_asked(inputs["predictor"], settings, trajectories), []
     for block in blocks(rows, _together(trajectories.steps)):
         part = within(progress, block.start - rows.start, block.stop - rows.start, rows.stop - rows.start)
-        parts.append(
-            evaluate(inputs["predictor"], trajectories, block, settings.first, settings.restart, settings.relift, part)
-        )
+        parts.append(evaluate(predictor, trajectories, block, settings.first, settings.restart, settings.relift, part))
     return join(parts).pack()
 
 
@@ -92,14 +93,16 @@ def _describe(figures: Meta, settings: Evaluate) -> str:
 
 def _check(task: Task) -> None:
     trained, tested = task.input("predictor").find("simulate"), task.input("trajectories").settings.plant
-    if trained is not None and trained.settings.plant.inputs != tested.inputs:
+    if trained is not None and not takes(task.input("predictor"), tested):
+        mine = tested_on(task.input("predictor"), trained.settings).plant
+        assert mine is not None, "settled when it was simulated"
         raise InvalidValueError(
-            f"the predictor is of the plant '{trained.settings.plant.kind}', the test trajectories of '{tested.kind}': "
+            f"the predictor is of the plant '{mine.kind}', the test trajectories of '{tested.kind}': "
             "they have different states or inputs"
         )
     steps = task.input("trajectories").settings.steps
     restart = task.settings.restart
-    check_horizon(min(steps, restart or steps), outlook(task.input("predictor")).horizon)
+    check_horizon(min(steps, restart or steps), outlook(as_fitted(task.input("predictor"), task.settings)).horizon)
     shortest = shortest_prediction(steps, restart)
     if task.settings.first > shortest:
         what = "the shortest prediction" if restart else "the test set"
@@ -114,10 +117,11 @@ def _check(task: Task) -> None:
 def _estimate(task: Task) -> Cost:
     test, settings = task.input("trajectories"), task.settings
     n, steps = test.ancestor("sample").settings.trajectories, test.settings.steps
-    about, kinds = outlook(task.input("predictor")), 1 + bool(settings.relift)
+    predictor = as_fitted(task.input("predictor"), settings)
+    about, kinds = outlook(predictor), 1 + bool(settings.relift)
     turns = steps * -(-n // min(settings.chunk, _together(steps)))
     seconds = bool(settings.relift) * turns * about.a_step
-    seconds += n * (1 + bool(settings.relift) * steps) * about.a_lift
+    seconds += n * (lifts(predictor, steps) + bool(settings.relift) * steps) * about.a_lift
     seconds += n * steps * (6e-9 * (about.functions + 100) + kinds * about.a_state)
     return Cost(seconds, 13e3 + 115.0 * n * -(-steps // (settings.restart or steps)))
 

@@ -18,7 +18,12 @@ from koopcli.stages.base import Task
 from koopcli.stages.naming import names, points
 from koopcli.stages.subject import of_vehicles, subject
 
-OF_LOGS = {"import": "log", "select": "selection", "score": "score"}  # stages, and what a figure calls what they make
+OF_LOGS = {
+    "import": "log",
+    "select": "selection",
+    "score": "score",
+    "control": "loop",
+}  # stages, and what a figure calls what they make
 TOLD_BESIDE = ("test", "plot")  # sections that matter beside a named predictor
 
 
@@ -98,7 +103,7 @@ def _check(name: str, kind: FigureKind, artefacts: Sequence[Task]) -> None:
                 f"{task.name} is a sample of kind '{task.settings.kind}'; the figure '{name}' takes those of kind "
                 f"{' or '.join(kind.kinds)}"
             )
-    if kind.draws == "beside":
+    if kind.draws == "beside" and kind.takes == "evaluation":
         for artefact in artefacts[1:]:
             _check_shared(name, artefacts[0], artefact)
 
@@ -163,6 +168,9 @@ def _series(
         series = points(kind.against, artefacts, experiment)
     elif labels is not None:
         series = tuple(Series(labels[task]) for task in artefacts)
+    elif kind.takes == "loop":
+        loops = [task.settings for task in artefacts]
+        series = tuple(Series(f"{loop.controller.kind}, {loop.scenario}") for loop in loops)
     else:
         series = tuple(Series(label) for label in names([task.input("predictor") for task in artefacts]))
     for entry in series:

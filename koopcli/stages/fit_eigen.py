@@ -19,6 +19,7 @@ from koopcli.koopman.eigen.recurrence import Surface, check_recurrence, check_st
 from koopcli.koopman.eigen.smoothing import check_length, noisy, smoothed
 from koopcli.koopman.eigen.tabulated import Tabulated
 from koopcli.koopman.eigen.windows import COMPOSED, Ahead, AlongTrajectory
+from koopcli.koopman.predictor.dynamics.force_driven import ForceDriven
 from koopcli.koopman.predictor.predictor import Predictor
 from koopcli.koopman.scores.metrics import summary
 from koopcli.records import Channels, FloatArray, Meta, Trajectories
@@ -44,7 +45,8 @@ def _run(settings: FitEigen, inputs: Inputs, context: Context) -> Predictor:
     signs = [] if plant is None else images(settings.mirror, plant.parameters, plant.states.names)
     complete = eigenfunctions.with_images(trajectories, signs)
     predictor = eigenfunctions.fit(complete, settings, 1 + len(signs), context.progress)
-    return replace(predictor, regression=replace(predictor.regression, noise=noise))
+    predictor = replace(predictor, regression=replace(predictor.regression, noise=noise))
+    return settings.inputs.drive(predictor, trajectories.plant)
 
 
 def _without_noise(
@@ -76,8 +78,11 @@ def _figures(predictor: Predictor) -> Meta:
     lift, trust = predictor.observables, predictor.trust
     assert isinstance(lift, (Tabulated, Futures))
     modes, noise, lookup = lift.modes, predictor.regression.noise, lift.nodes.search.lift
+    dynamics = predictor.dynamics
+    driven = {"inputs": list(predictor.input_channels.names)} if isinstance(dynamics, ForceDriven) else {}
     return {
         **figures(predictor),
+        **driven,
         "rates": modes.rates.real.tolist(),
         "frequencies": modes.rates.imag.tolist(),
         "modes": len(modes.rates),
@@ -104,6 +109,8 @@ def _describe(figures: Meta, settings: FitEigen) -> str:
         text += f"; softness {figures['softness']:g}"
     if figures["trust"] is not None:
         text += f"; median error in cross-validation {figures['trust']['median']:.2g} %"
+    if "inputs" in figures:
+        text += f"; inputs: {', '.join(figures['inputs'])}"
     cut = "rounding" if settings.window.cut is None else f"{settings.window.cut:g}"
     return f"{text}; {regression(figures)} at cut {cut}"
 
@@ -145,6 +152,7 @@ def _check(task: Task) -> None:
     fit.eigenvalues.check()
     fit.window.check(states)
     fit.check_scale(len(states))
+    fit.inputs.check(isinstance(fit.window, Ahead), fit.lift, states)
     eigenfunctions.check_window(plant.steps, fit, plant.dt)
     if fit.smooth:
         check_length(plant.steps + 1)
@@ -170,6 +178,7 @@ def _outlook(task: Task) -> Outlook:
         eigenfunctions.check_window(plant.steps, fit, plant.dt)
         horizon = fit.window.horizon_steps(fit, plant.steps, plant.dt)
     lift = A_LOOKUP * _lookups(fit, horizon)
+    horizon = fit.inputs.horizon(horizon)
     return Outlook(copies * fit.eigenvalues.count(n_x), horizon, fit.window.name(fit), a_lift=lift)
 
 

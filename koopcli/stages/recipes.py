@@ -17,6 +17,7 @@ from koopcli.koopman.eigen.fit import FitEigen
 from koopcli.records import Meta
 from koopcli.simulation.samples.point import PointSample
 from koopcli.simulation.samples.sample import SampleChoice
+from koopcli.stages.asked import in_force, tested_on
 from koopcli.stages.base import Task
 from koopcli.stages.fit_edmd import is_product
 from koopcli.stages.roles import as_inputs
@@ -105,7 +106,7 @@ def evaluation(experiment: Experiment, of: Task | None = None, on: Task | None =
     its plant.
     """
     scored = of or predictor(experiment)
-    trajectories = on or test_set(experiment, scored.ancestor("simulate").settings)
+    trajectories = on or test_set(experiment, tested_on(scored, scored.ancestor("simulate").settings))
     first = experiment.evaluate.first
     if first is None:
         first = trajectories.settings.plant.first
@@ -113,7 +114,7 @@ def evaluation(experiment: Experiment, of: Task | None = None, on: Task | None =
     if relift is None:
         composed = scored.stage == "fit-eigen" and scored.settings.window.lookup_steps is not None
         relift = not (composed or (scored.stage == "fit-edmd" and bool(scored.settings.memory)))
-    settings = replace(experiment.evaluate, first=first, relift=relift)
+    settings = replace(in_force(experiment.evaluate, scored), first=first, relift=relift)
     return Task("evaluate", settings, (("predictor", scored), ("trajectories", trajectories)))
 
 
@@ -157,7 +158,8 @@ def side_by_side(experiment: Experiment) -> list[Task]:
     """
     main = predictor(experiment, "fit-eigen")
     others = beside(experiment, main.input("trajectories"))
-    return [evaluation(experiment, task) for task in dict.fromkeys((main, *others))]
+    test = evaluation(experiment, main).input("trajectories")
+    return [evaluation(experiment, task, test) for task in dict.fromkeys((main, *others))]
 
 
 def vehicles(experiment: Experiment) -> list[tuple[str, Experiment]]:

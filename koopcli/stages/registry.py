@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from koopcli.stages import evaluate, logs, plot, predict, sample, score, select, simulate, sweep
+from koopcli.stages import control, evaluate, logs, plot, predict, sample, score, select, simulate, sweep
 from koopcli.stages.base import Stage
 from koopcli.stages.fits import FITS
 
@@ -10,6 +10,6 @@ STAGES: dict[str, Stage] = {
     stage.name: stage
     for stage in (
         *(sample.STAGE, simulate.STAGE, logs.STAGE, *FITS.values()),
-        *(evaluate.STAGE, select.STAGE, score.STAGE, predict.STAGE, sweep.STAGE, plot.STAGE),
+        *(evaluate.STAGE, select.STAGE, score.STAGE, predict.STAGE, control.STAGE, sweep.STAGE, plot.STAGE),
     )
 }

@@ -11,6 +11,7 @@ from koopcli.config.settings import Baseline
 from koopcli.koopman.edmd.fit import FitEdmd
 from koopcli.records import Meta
 from koopcli.stages import recipes
+from koopcli.stages.asked import in_force
 from koopcli.stages.base import Task
 from koopcli.stages.fit_edmd import OF_ONE_RUN
 from koopcli.stages.fits import LIFTED
@@ -40,9 +41,9 @@ def beside(experiment: Experiment, evaluation: Task) -> dict[str, Task]:
         "linearisation": recipes.baseline(replace(experiment, baseline=Baseline("linearisation")), data[0]),
         "linear": recipes.fit_edmd(replace(experiment, fit_edmd=LINEAR), *data),
     }
-    trajectories = evaluation.input("trajectories")
+    asked, trajectories = evaluation.settings, evaluation.input("trajectories")
     return {
-        name: Task("evaluate", evaluation.settings, (("predictor", task), ("trajectories", trajectories)))
+        name: Task("evaluate", in_force(asked, task), (("predictor", task), ("trajectories", trajectories)))
         for name, task in others.items()
         if (task.stage, task.settings) != (predictor.stage, predictor.settings)
     }

@@ -15,8 +15,8 @@ from tests.cli.test_errors import one_line
 from tests.cli.test_help import COMMANDS
 
 FIRST = {"baseline": ["hold"], "plot": ["orders"], "sweep": ["--set", "fit-edmd.order=1,2"]}
-LOOKED_UP = {"--experiment", "--vehicle", "--on", "--from"}
-OF_FILES = {"import"}  # commands whose argument is no name
+LOOKED_UP = {"--experiment", "--vehicle", "--on", "--from", "--predictor"}
+OF_FILES = {"import", "control"}  # commands whose argument is no name of an artefact
 ENUMERATED = {"--mirror", "--set"}
 
 

@@ -130,7 +130,7 @@ def test_a_vehicle_without_wheels(koop, folder):
     one_line(koop("sample", "manoeuvre", "--vehicle", "bare.toml"), 3, "inertia J_R and radius r_w")
     checked = koop("vehicle", "check", "bare.toml", tiny=False)
     assert checked.code == 0
-    assert "with the plants forces, slips" in checked.err
+    assert "with the plants forces, slips, axle-forces" in checked.err
     assert "no wheels" in checked.err
 
 
@@ -180,6 +180,9 @@ def test_vehicle_check_of_a_good_file(koop, folder):
     (folder / "mine.toml").write_text(text)
     checked = koop("vehicle", "check", "mine.toml", tiny=False)
     assert checked.code == 0
-    assert "mine.toml can be used with the plants forces, slips, wheels; nothing about it is unusual" in checked.err
+    assert (
+        "mine.toml can be used with the plants forces, slips, axle-forces, wheels; nothing about it is unusual"
+        in checked.err
+    )
     (folder / "mine.toml").write_text(text.replace("value = 2688.0", "value = 26880.0"))
     assert "is its unit right?" in koop("vehicle", "check", "mine.toml", tiny=False).err

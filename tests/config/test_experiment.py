@@ -227,7 +227,10 @@ def test_a_vehicle_beside_the_experiment_file(tmp_path):
         ("[sample]\nkind = 'cube'", "'sample' has no kind 'cube'"),
         ("[sample.cube]\nseed = 1", "'sample' has no kind 'cube'"),
         ("[sample]\ngrid = 3", "'sample.grid' must be a table of settings, got 3"),
-        ("[sample.grid]\nenergy = 3.0", "'sample.grid.energy' belongs to sample 'ball' or 'ellipsoid' or 'greedy'"),
+        (
+            "[sample.grid]\nenergy = 3.0",
+            "'sample.grid.energy' belongs to sample 'ball' or 'ball-forces' or 'ellipsoid' or 'greedy'",
+        ),
         ("[sample.ball]\ncount = 0", "'sample.ball.count' must be at least 1"),
         ("[test.ball]\nm = 3", "'test.ball.m' is the vehicle's: set vehicle.m"),
         ("[sample]\nkind = ['grid']", "'sample' has no kind ['grid']"),

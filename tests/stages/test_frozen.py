@@ -17,7 +17,7 @@ from koopcli.store.pins import pins
 from koopcli.store.verify import verify
 from tests.stages.frozen import STORE, tasks
 
-LATER = {"import", "select", "score", "predict"}  # stages younger than this store
+LATER = {"import", "select", "score", "predict", "control"}  # stages younger than this store
 
 
 @pytest.fixture(scope="module")

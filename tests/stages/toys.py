@@ -10,7 +10,7 @@ import json
 import re
 import sys
 from dataclasses import MISSING, fields, is_dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -21,17 +21,23 @@ from koopcli.config.declared import every_setting
 from koopcli.config.pictures import Cone, Plot, Series, Subject, Tyres
 from koopcli.config.settings import Baseline, Evaluate, Simulate, Sweep, SweepAxis
 from koopcli.config.shipped import fingerprint
+from koopcli.control.closed import ClosedLoop
+from koopcli.control.controllers.esc import EscControl
 from koopcli.figures.kit.registry import FIGURES
 from koopcli.koopman.bases.orthonormal import OrthonormalPolynomials
 from koopcli.koopman.bases.polynomial import Polynomial
 from koopcli.koopman.edmd.fit import FitEdmd, fit_measured
 from koopcli.koopman.eigen.fit import FitEigen
+from koopcli.koopman.eigen.forces import force_matrix
+from koopcli.koopman.eigen.futures import Futures
 from koopcli.koopman.eigen.lookup.nearest import NearestLift
+from koopcli.koopman.eigen.lookup.polyharmonic import PolyharmonicLift
 from koopcli.koopman.eigen.nodes import Search, nodes_of
 from koopcli.koopman.eigen.tabulated import Tabulated
 from koopcli.koopman.predictor.coverage import Coverage
 from koopcli.koopman.predictor.dynamics.bilinear import Bilinear
 from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
+from koopcli.koopman.predictor.dynamics.force_driven import ForceDriven
 from koopcli.koopman.predictor.dynamics.linear import Linear
 from koopcli.koopman.predictor.modes import Modes
 from koopcli.koopman.predictor.predictor import Predictor
@@ -40,7 +46,8 @@ from koopcli.koopman.predictor.trust import Trust
 from koopcli.koopman.scores.baselines import Forecast
 from koopcli.koopman.scores.evaluation import Evaluation
 from koopcli.koopman.scores.swept import SCORES, Swept
-from koopcli.koopman.selection.score import score
+from koopcli.koopman.selection.record import Selection
+from koopcli.koopman.selection.score import Score, score
 from koopcli.koopman.selection.select import select
 from koopcli.logs.files import expand
 from koopcli.logs.imported import Log
@@ -49,6 +56,7 @@ from koopcli.progress import silent
 from koopcli.records import Channels, Episodes, Meta, Packed, Sample, Trajectories
 from koopcli.simulation.manoeuvres import MANOEUVRES
 from koopcli.simulation.samples.ball import BallSample
+from koopcli.simulation.samples.ball_forces import BallForcesSample
 from koopcli.simulation.samples.box import BoxSample
 from koopcli.simulation.samples.drive import DriveSample
 from koopcli.simulation.samples.ellipsoid import EllipsoidSample
@@ -56,7 +64,9 @@ from koopcli.simulation.samples.greedy import GreedySample
 from koopcli.simulation.samples.grid import GridSample
 from koopcli.simulation.samples.manoeuvre import ManoeuvreSample
 from koopcli.simulation.samples.point import PointSample
+from koopcli.stages import control
 from koopcli.stages.base import Context
+from koopcli.stages.control import Loop
 from koopcli.stages.logs import imported
 from koopcli.stages.predict import Predict
 from koopcli.stages.registry import STAGES
@@ -65,8 +75,10 @@ from koopcli.stages.select import Select
 from koopcli.vehicles.parameters import MagicFormula, VehicleParameters
 from koopcli.vehicles.plants.forces import ForceInput, Forces
 from koopcli.vehicles.plants.slips import SlipInput, Slips
+from koopcli.vehicles.plants.slips_axle_forces import AxleForces, ForceChange
 from koopcli.vehicles.plants.wheels import TorqueInput, Wheels
 
+control.CLOCK = lambda: 0.0  # what a step takes is no result
 SIMULATED = Path(__file__).parents[2] / "data" / "logs" / "simulated"
 PINS = Path(__file__).parents[1] / "golden" / "stages.json"
 BEYOND = 1e12  # a condition number past this is rounding
@@ -167,10 +179,33 @@ def _steered() -> Trajectories:
     return Trajectories(data.x, 1e-3 * np.asarray(data.u), data.dt, STATES, INPUTS)
 
 
-def _forecast(kind: str) -> Forecast:
+def _plant(kind: str) -> Meta:
+    """The plant of ``CAR`` as trajectories remember it."""
     vehicle = {**vars(CAR), "lateral": vars(CAR.lateral), "longitudinal": vars(CAR.longitudinal)}
-    plant = {"plant": "slips", "v_eps": 0.1, "vehicle": vehicle}
-    return Forecast(kind, 0.01, _coverage(), STATES, INPUTS, plant)
+    return {"plant": kind, "v_eps": 0.1, "vehicle": vehicle}
+
+
+def _forecast(kind: str) -> Forecast:
+    return Forecast(kind, 0.01, _coverage(), STATES, INPUTS, _plant("slips"))
+
+
+def _pushed() -> Trajectories:
+    """Under changes of axle forces."""
+    data = _trajectories(4)
+    u = 20 * np.asarray(data.u)
+    return Trajectories(data.x, u, data.dt, STATES, ForceChange.inputs, plant=_plant("axle-forces"))
+
+
+def _force_driven() -> Predictor:
+    """Lifted states of two modes, looked up by splines, and forces that drive them."""
+    modes = Modes(np.array([-1.0, -0.2]), np.array([0.0]), 3, 0.01)
+    states = _trajectories(9).x[::6]
+    nodes = nodes_of(states, 4, Search(PolyharmonicLift(neighbours=12), np.array([20.0, 15.0, 5.0])))
+    lift = Futures(states, nodes, "world", np.sin(np.arange(14.0)).reshape(2, 7) / 4, modes)
+    C = np.cos(np.arange(18.0)).reshape(3, 6)
+    dynamics = ForceDriven(modes, 4, force_matrix(CAR), "every", 2)
+    found, inputs = Regression(2, 2, 1.0, missed=0.7), ForceChange.inputs
+    return Predictor(lift, dynamics, C, 0.01, _coverage(), STATES, inputs, found, horizon=6, plant=_plant("slips"))
 
 
 def _bilinear() -> Predictor:
@@ -204,6 +239,12 @@ def _evaluation() -> Evaluation:
 def _slid() -> Sample:
     u = 0.1 * np.sin(np.arange(12.0) ** 2).reshape(3, 1, 4)
     return Sample((), np.array([[20.0, 1, 2], [-5, 3, -8], [0.01, -2, 5]]), u, False, STATES, SlipInput.inputs)
+
+
+def _shoved() -> Sample:
+    """The same states under changes of axle forces."""
+    u = 3000 * np.sin(np.arange(12.0) ** 2).reshape(3, 1, 4)
+    return Sample((), _slid().x0, u, False, STATES, ForceChange.inputs)
 
 
 def _driven() -> Sample:
@@ -263,9 +304,10 @@ def figure_records(name: str) -> dict:
         "training": _gliding(),
         "sample": _on_a_surface(),
         "sweep": _swept(),
+        "loop": _loop(),
         "log": _log(),
-        "selection": select(_log().episodes, Select(bicycle=False).rungs),
-        "score": score(_of_log(), _of_log(0.0), _log().episodes, own=True),
+        "selection": _selection(),
+        "score": _scored_log(),
     }
     if kind.takes == "score":
         records |= {"predictor": _of_log(), "trajectories": _log()}
@@ -283,6 +325,7 @@ def _swept() -> Swept:
     return Swept(names, (("1", "2", "4"), ("linear", "bilinear"), ("0", "1")), np.array(places), {**scores, **counts})
 
 
+@cache
 def _log() -> Log:
     """Two recordings of a car in small: a speed that a pedal drives, and a yaw rate that steer and speed drive."""
     t = 0.05 * np.arange(900.0)
@@ -297,6 +340,28 @@ def _log() -> Log:
     return Log(Episodes(x, u, 0.05, bounds, starts, runs, *channels), display={"yaw_rate": "deg/s", "steer": "deg"})
 
 
+def _loop() -> ClosedLoop:
+    """Two cars, the second of which never comes to rest."""
+    t = 0.01 * np.arange(101.0)
+    states = np.stack([np.stack([15 + 5 * np.exp(-t), np.exp(-2 * t), a * np.cos(5 * t)], axis=1) for a in (0.1, 2.0)])
+    inputs = 0.1 * np.sin(np.arange(800.0)).reshape(2, 100, 4)
+    whole = {"cpu": np.full((2, 100), 1e-3), "settled": np.array([0.9, np.inf]), "cost": np.array([3.0, 40.0])}
+    counts = {"kkt": np.array([1e-9, 1e-7]), "unsolved": np.array([0, 3]), "ended": ("", "")}
+    reference = np.tile([15.0, 0, 0], (101, 1))
+    return ClosedLoop(states, reference, inputs, **whole, **counts, dt=0.01, solves=True, tracks=False)
+
+
+@cache
+def _selection() -> Selection:
+    return select(_log().episodes, Select(bicycle=False).rungs)
+
+
+@cache
+def _scored_log() -> Score:
+    return score(_of_log(), _of_log(0.0), _log().episodes, own=True)
+
+
+@cache
 def _of_log(memory: float = 0.2) -> Predictor:
     how = FitEdmd.of(basis="total", order=1, terms="products" if memory else "linear", memory=memory)
     return fit_measured(_log().episodes, how)
@@ -343,6 +408,7 @@ TOYS = {
             ),
             {},
         ),
+        (BallForcesSample(count=3, steps=7, hold=3, vehicle=CAR), {}),
     ],
     "simulate": [
         (Simulate(vehicle=CAR).settled(Forces(), 3), {"sample": _sample()}),
@@ -356,6 +422,7 @@ TOYS = {
         (Simulate(vehicle=ON_WHEELS, reference=True).settled(Wheels(), 3), {"sample": _driven()}),
         (Simulate(vehicle=CAR, noise=0.1, noise_seed=2).settled(Slips(), 3), {"sample": _slid()}),
         (Simulate(vehicle=CAR, noise=0.1, noise_memory=0.8).settled(Slips(), 3), {"sample": _slid()}),
+        (Simulate(vehicle=CAR).settled(AxleForces(combined="ellipse"), 20), {"sample": _shoved()}),
     ],
     "fit-edmd": [
         (FitEdmd.of(order=2), {"trajectories": _trajectories(1)}),
@@ -408,6 +475,21 @@ TOYS = {
             ),
             {"trajectories": _swinging()},
         ),
+        (
+            FitEigen.of(
+                eigenvalues="comb",
+                pairs=1,
+                cut=1e-8,
+                window="horizon",
+                tabulate=0.5,
+                lift="polyharmonic",
+                neighbours=12,
+                inputs="forces",
+                input_matrix="between",
+                every=4,
+            ),
+            {"trajectories": replace(_swinging(), plant=_plant("slips"))},
+        ),
     ],
     "baseline": [
         (Baseline(), {"trajectories": _gliding()}),
@@ -433,6 +515,11 @@ TOYS = {
             _scored(chunk=100, first=0),
             {"predictor": _forecast("linearisation"), "trajectories": _steered()},
         ),
+        *(
+            (_scored(chunk=100, first=0, **asked), {"predictor": _force_driven(), "trajectories": _pushed()})
+            for asked in ({}, {"input_matrix": "between"}, {"every": 3}, {"input_matrix": "relift"})
+        ),
+        (_scored(chunk=100, first=0), {"predictor": _forecast("linearisation"), "trajectories": _pushed()}),
     ],
     "sweep": [
         (
@@ -451,6 +538,16 @@ TOYS = {
     "predict": [
         (Predict(at=3.0, run=1, seconds=0.5), {"predictor": _of_log(), "trajectories": _log()}),
         (Predict(x0=(14.0, 0.1), u=((0.5, 0.05),) * 5, seconds=0.25), {"predictor": _of_log()}),
+    ],
+    "control": [
+        (Loop(vehicle=ON_WHEELS, driven=ON_WHEELS, scenario="spin", controller=EscControl(), seconds=0.1), {}),
+        (
+            Loop(
+                **{"vehicle": ON_WHEELS, "driven": CAR, "scenario": "random", "controller": EscControl(), "count": 2},
+                **{"plant": "slips", "seconds": 0.1, "noise": 0.1, "delay": 2},
+            ),
+            {},
+        ),
     ],
     "plot": [(figure_settings(name), figure_records(name)) for name in FIGURES],
 }

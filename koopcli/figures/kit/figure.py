@@ -24,7 +24,7 @@ LOST = " (all diverged)"  # after the name of one among several that has no erro
 Recipes = Any  # the module koopcli.stages.recipes, which is handed over: figures stand below the stages
 Task = Any  # of koopcli.stages.base, for the same reason
 Takes = Literal[
-    "evaluation", "predictor", "fit", "sample", "trajectories", "sweep", "log", "selection", "score", "nothing"
+    "evaluation", "predictor", "fit", "sample", "trajectories", "sweep", "log", "selection", "score", "loop", "nothing"
 ]
 TAKES: dict[Takes, tuple[str, ...]] = {
     "evaluation": ("evaluate",),
@@ -36,6 +36,7 @@ TAKES: dict[Takes, tuple[str, ...]] = {
     "log": ("import",),
     "selection": ("select",),
     "score": ("score",),
+    "loop": ("control",),
     "nothing": (),
 }  # the stages that make what a figure takes
 

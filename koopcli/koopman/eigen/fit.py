@@ -9,6 +9,7 @@ import numpy as np
 from koopcli.checks import Settings
 from koopcli.choices import setting
 from koopcli.errors import InvalidValueError
+from koopcli.koopman.eigen.forces import Coasting, Driven
 from koopcli.koopman.eigen.lookup.lookup import Lift
 from koopcli.koopman.eigen.lookup.nearest import NearestLift
 from koopcli.koopman.eigen.nodes import Search
@@ -62,6 +63,8 @@ class FitEigen(Settings):
     smooth: bool | None = setting(
         None, option=True, help="smooth each trajectory and choose the softness of splines; else where noise is seen"
     )
+
+    inputs: Driven = setting(Coasting(), option=True, help="what moves the predicted car")
 
     def tabulated(self, dt: float) -> int:
         """Steps of ``dt`` s of each trajectory that are looked up."""

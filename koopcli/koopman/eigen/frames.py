@@ -16,15 +16,17 @@ PLANAR = ("v_x", "v_y", "yaw_rate")  # the first states of a body in the plane
 @dataclass(frozen=True)
 class Frame:
     """``seen(x, dt)``: futures ``x`` (n, samples, n_x) in the frame; ``back(seen, x0, dt)``: the inverse, of a future
-    from ``x0`` (n, n_x).
+    from ``x0`` (n, n_x); ``back_with_slopes(seen, x0, dt)``: the same of ``seen`` (n, samples, n_x, 1 + n_x),
+    which holds the derivatives in x0 beside each value.
     """
 
     seen: Callable[[FloatArray, float], FloatArray]
     back: Callable[[FloatArray, FloatArray, float], FloatArray]
+    back_with_slopes: Callable[[FloatArray, FloatArray, float], FloatArray]
 
 
 def yaw(yaw_rate: FloatArray, dt: float) -> FloatArray:
-    """The angle (n, samples) in rad turned since the first sample, by the trapezoidal rule (7.13)."""
+    """The angle (n, samples, ...) in rad turned since the first sample, by the trapezoidal rule (7.13)."""
     angle = np.zeros_like(yaw_rate)
     np.cumsum(dt * (yaw_rate[:, 1:] + yaw_rate[:, :-1]) / 2, axis=1, out=angle[:, 1:])
     return angle
@@ -50,9 +52,22 @@ def _in_the_body(seen: FloatArray, x0: FloatArray, dt: float) -> FloatArray:
     return turned(moving, -yaw(moving[..., 2], dt))
 
 
+def _slopes_in_the_body(seen: FloatArray, x0: FloatArray, dt: float) -> FloatArray:
+    moving = seen.copy()
+    moving[..., 0] += x0[:, np.newaxis]
+    moving[..., 1:] += np.eye(x0.shape[1])
+    angle = yaw(moving[:, :, 2], dt)  # and how it changes with x0, (n, samples, 1 + n_x)
+    c, s = np.cos(angle[..., :1]), np.sin(angle[..., :1])
+    v_x, v_y = moving[:, :, 0], moving[:, :, 1]
+    moving[:, :, 0], moving[:, :, 1] = c * v_x + s * v_y, c * v_y - s * v_x
+    moving[:, :, 0, 1:] += moving[:, :, 1, :1] * angle[..., 1:]
+    moving[:, :, 1, 1:] -= moving[:, :, 0, :1] * angle[..., 1:]
+    return moving
+
+
 FRAMES: dict[str, Frame] = {
-    "state": Frame(lambda x, dt: x, lambda seen, x0, dt: seen),
-    "world": Frame(_in_the_world, _in_the_body),
+    "state": Frame(lambda x, dt: x, lambda seen, x0, dt: seen, lambda seen, x0, dt: seen),
+    "world": Frame(_in_the_world, _in_the_body, _slopes_in_the_body),
 }
 
 

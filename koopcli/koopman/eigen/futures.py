@@ -77,6 +77,51 @@ class Futures(Content):
         blocks = np.matmul(self.projection, self.future(x))  # (n, L, n_x)
         return np.asarray(blocks.transpose(0, 2, 1).reshape(len(x), self.functions))
 
+    def future_with_slopes(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The future of ``x`` (n, n_x), and its derivative in x, (n, horizon + 1, n_x, n_x), whose last axis is x's.
+
+        By the weights of the splines with their nodes held fixed (7.22), and from one lookup to the next by the chain
+        rule; values and derivatives are solved for together. Raises ``InvalidValueError`` for a lookup without a
+        derivative.
+        """
+        n, n_x = x.shape
+        out = np.empty((n, self.horizon + 1, n_x, 1 + n_x))
+        for start in range(0, n, TOGETHER):
+            rows = slice(start, start + TOGETHER)
+            out[rows, : self.ahead + 1] = self._looked_up_with_slopes(x[rows])
+            for k in range(self.ahead, self.horizon, self.ahead):
+                left, on = self.horizon - k, slice(k + 1, k + 1 + self.ahead)
+                after = self._looked_up_with_slopes(out[rows, k, :, 0])[:, 1 : left + 1]
+                out[rows, on, :, 0] = after[..., 0]
+                out[rows, on, :, 1:] = np.matmul(after[..., 1:], out[rows, k, np.newaxis, :, 1:])
+        return out[..., 0], out[..., 1:]
+
+    def _looked_up_with_slopes(self, x: FloatArray) -> FloatArray:
+        """What one lookup gives, and beside each value its derivatives in ``x`` (n, n_x), (n, ahead + 1, n_x, 1 +
+        n_x).
+        """
+        n, n_x = x.shape
+        summed = self._summed(*self.nodes.find_slopes(x)).reshape(n, 1 + n_x, self.ahead + 1, n_x)
+        return FRAMES[self.frame].back_with_slopes(summed.transpose(0, 2, 3, 1), x, self.modes.dt)
+
+    def with_slopes(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """ψ(x) (n, N) of the states (n, n_x), and ∂ψ/∂x (n, N, n_x), for little more than ψ(x) alone (7.22)."""
+        future, slopes = self.future_with_slopes(x)
+        n, samples, n_x = future.shape
+        blocks = np.matmul(self.projection, future).transpose(0, 2, 1)  # (n, n_x, L)
+        turning = np.matmul(self.projection, slopes.reshape(n, samples, n_x * n_x)).reshape(
+            n, len(self.projection), n_x, n_x
+        )
+        return blocks.reshape(n, self.functions), turning.transpose(0, 2, 1, 3).reshape(n, self.functions, n_x)
+
+    def derivative(self, x: FloatArray) -> FloatArray:
+        """∂ψ/∂x (n, N, n_x) at the states ``x`` (n, n_x), in units of ψ over those of x."""
+        return self.with_slopes(x)[1]
+
+    def future_derivative(self, x: FloatArray) -> FloatArray:
+        """The derivative (n, horizon + 1, n_x, n_x) of the future of ``x`` (n, n_x) in x, which is the last axis."""
+        return self.future_with_slopes(x)[1]
+
     def observe(self, x: FloatArray, rows: FloatArray) -> FloatArray:
         """rows · ψ(x) as (n, R), for ``rows`` (R, N)."""
         return self.lift(x) @ rows.T
@@ -97,6 +142,20 @@ class Futures(Content):
         ends = np.arange(len(x) + 1) * indices.shape[1]
         table = csr_matrix((weights.ravel(), indices.ravel(), ends), shape=(len(x), len(self._values)))
         return np.asarray(table @ self._values)
+
+    def _summed(self, indices: IndexArray, weights: FloatArray, slopes: FloatArray) -> FloatArray:
+        """The weighted sums of the nodes' futures, and those by the ``slopes`` (n, q, n_x) of the weights, (n, 1 + n_x,
+        (ahead + 1) · n_x).
+        """
+        tabled = self.tabled and self._table_bytes <= LARGEST_TABLE
+        rows = np.concatenate([weights[:, np.newaxis], slopes.transpose(0, 2, 1)], axis=1)
+        summed = np.empty((*rows.shape[:2], self._width))
+        for start in range(0, len(indices), GATHERED):
+            some = slice(start, start + GATHERED)
+            nodes = indices[some]
+            values = self._values[nodes] if tabled else self._values_of(nodes.ravel())
+            summed[some] = np.matmul(rows[some], values.reshape(*nodes.shape, self._width))
+        return summed
 
     def _gathered(self, indices: IndexArray, weights: FloatArray) -> FloatArray:
         """The same without a table of all nodes: what follows those that are found."""

@@ -11,8 +11,8 @@ from koopcli.checks import restored
 from koopcli.choices import written
 from koopcli.content import Content
 from koopcli.koopman.eigen.lookup.cloud import Cloud
-from koopcli.koopman.eigen.lookup.lookup import Lift, Lookup, search
-from koopcli.koopman.predictor.places import placed
+from koopcli.koopman.eigen.lookup.lookup import Lift, Lookup, Smooth, no_slopes, search, search_slopes
+from koopcli.koopman.predictor.places import place_slopes, placed
 from koopcli.records import OF_STATES, Array, FloatArray, IndexArray, Meta, Packed
 
 BISECTIONS = 40
@@ -60,6 +60,17 @@ class Nodes(Content):
     def find(self, x: FloatArray) -> tuple[IndexArray, FloatArray]:
         """Nodes (n, q) for the states ``x`` (n, n_x), and what each counts; a state that is not finite has none."""
         return search(self._lookup, self.search.place(x))
+
+    def find_slopes(self, x: FloatArray) -> tuple[IndexArray, FloatArray, FloatArray]:
+        """The same, and the derivative of what each counts in ``x``, (n, q, n_x), with the nodes found held fixed.
+
+        Raises ``InvalidValueError`` for a lookup without a derivative.
+        """
+        how, lookup = self.search, self._lookup
+        if not isinstance(lookup, Smooth):
+            raise no_slopes(how.lift)
+        indices, weights, slopes = search_slopes(lookup, how.place(x))
+        return indices, weights, np.matmul(slopes, place_slopes(x, how.scale, how.power))
 
     def only(self, chosen: IndexArray) -> Nodes:
         """Those nodes alone."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from koopcli.records import FloatArray, Packed
 
@@ -28,6 +28,14 @@ class Observables(Protocol):
 
     def pack(self) -> Packed:
         """The lift as arrays, with its kind."""
+
+
+@runtime_checkable
+class Differentiable(Observables, Protocol):
+    """A lift with a derivative in the state."""
+
+    def with_slopes(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """ψ(x) (n, N) of the states (n, n_x), and ∂ψ/∂x (n, N, n_x)."""
 
 
 class Explicit(Observables, Protocol):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Protocol, Self
+from typing import ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 
@@ -21,10 +21,22 @@ class Lookup(Protocol):
         """Indices (n, q) of nodes and their weights (n, q), of sum one, for finite places ``y`` (n, n_x)."""
 
 
+@runtime_checkable
+class Smooth(Lookup, Protocol):
+    """A lookup whose weights have a derivative."""
+
+    def with_slopes(self, y: FloatArray) -> tuple[IndexArray, FloatArray, FloatArray]:
+        """Indices and weights (n, q), and the derivative of the weights in ``y``, (n, q, n_x), with the neighbours held
+        fixed.
+        """
+
+
 class Lift(Choice):
     """How a state is looked up. ``beyond``: what happens outside the convex hull of the nodes."""
 
     beyond: ClassVar[str]
+    smooth: ClassVar[bool] = False
+    """Whether its lookups are ``Smooth``."""
     neighbours: int = 1
     spacing: int | None = None
 
@@ -72,6 +84,14 @@ class Lift(Choice):
             )
 
 
+def no_slopes(lift: Lift) -> InvalidValueError:
+    """The error of a ``lift`` without a derivative where one is asked for."""
+    return InvalidValueError(
+        f"the lift '{lift.kind}' has no derivative in the state, which force inputs need: fit with the lift "
+        "'polyharmonic' (fit-eigen.lift)"
+    )
+
+
 def search(lookup: Lookup, y: FloatArray) -> tuple[IndexArray, FloatArray]:
     """What ``lookup`` finds for ``y`` (n, n_x); a place that is not finite has weights that are no numbers."""
     finite = np.isfinite(y).all(axis=1)
@@ -82,3 +102,15 @@ def search(lookup: Lookup, y: FloatArray) -> tuple[IndexArray, FloatArray]:
     weights = np.full(indices.shape, np.nan)
     indices[finite], weights[finite] = near, given
     return indices, weights
+
+
+def search_slopes(lookup: Smooth, y: FloatArray) -> tuple[IndexArray, FloatArray, FloatArray]:
+    """The same with the derivative of the weights in the place."""
+    finite = np.isfinite(y).all(axis=1)
+    if finite.all():
+        return lookup.with_slopes(y)
+    near, given, turning = lookup.with_slopes(y[finite])
+    indices = np.zeros((len(y), near.shape[1]), dtype=np.intp)
+    weights, slopes = np.full(indices.shape, np.nan), np.full((*indices.shape, y.shape[1]), np.nan)
+    indices[finite], weights[finite], slopes[finite] = near, given, turning
+    return indices, weights, slopes

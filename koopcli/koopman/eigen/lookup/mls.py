@@ -50,6 +50,41 @@ def trend_weights(near: FloatArray) -> FloatArray:
     return np.asarray(np.matmul(weighted, np.linalg.solve(gram, constant))[..., 0])
 
 
+def trend_slopes(near: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The same weights (n, q), and their derivative (n, q, n_x) in the place that is zero.
+
+    A place that moves by d sees the nodes move by -d, and the width by what the farthest one moves.
+    """
+    n, q, n_x = near.shape
+    square = (near**2).sum(axis=2)
+    far = square.argmax(axis=1)
+    farthest = np.sqrt(square[np.arange(n), far])
+    width = WIDTH * farthest[:, np.newaxis] + TINY
+    widening = -WIDTH * near[np.arange(n), far] / np.maximum(farthest, TINY)[:, np.newaxis]  # of the width, (n, n_x)
+    scaled, swelling = near / width[..., np.newaxis], widening / width
+    weight = np.exp(-square / width**2)
+    terms = np.concatenate([np.ones((n, q, 1)), scaled], axis=2)
+    ridge = RIDGE * np.diag([0.0] + [1.0] * n_x)
+    gram = np.einsum("nqa,nq,nqb->nab", terms, weight, terms) + weight.sum(axis=1)[:, np.newaxis, np.newaxis] * ridge
+    constant = np.zeros((n, 1 + n_x, 1))
+    constant[:, 0] = 1.0
+    plane = np.linalg.solve(gram, constant)[..., 0]
+    slopes = np.empty((n, q, n_x))
+    for i in range(n_x):
+        inwards = 2 * scaled[..., i] / width + 2 * swelling[:, i, np.newaxis] * square / width**2
+        d_weight = weight * inwards
+        d_terms = np.zeros_like(terms)
+        d_terms[..., 1:] = -swelling[:, i, np.newaxis, np.newaxis] * scaled
+        d_terms[..., 1 + i] -= 1 / width
+        half = np.einsum("nqa,nq,nqb->nab", d_terms, weight, terms)
+        d_gram = np.einsum("nqa,nq,nqb->nab", terms, d_weight, terms) + half + half.transpose(0, 2, 1)
+        d_gram += d_weight.sum(axis=1)[:, np.newaxis, np.newaxis] * ridge
+        d_plane = np.linalg.solve(gram, -np.einsum("nab,nb->na", d_gram, plane)[..., np.newaxis])[..., 0]
+        slopes[..., i] = d_weight * np.einsum("nqa,na->nq", terms, plane)
+        slopes[..., i] += weight * (np.einsum("nqa,na->nq", d_terms, plane) + np.einsum("nqa,na->nq", terms, d_plane))
+    return weight * np.einsum("nqa,na->nq", terms, plane), slopes
+
+
 @dataclass(frozen=True)
 class MlsLift(Lift):
     """Moving least squares."""

@@ -7,6 +7,7 @@ from typing import ClassVar, Protocol
 
 from koopcli.koopman.predictor.dynamics.bilinear import Bilinear
 from koopcli.koopman.predictor.dynamics.diagonal import Diagonal
+from koopcli.koopman.predictor.dynamics.force_driven import ForceDriven
 from koopcli.koopman.predictor.dynamics.generator import Generator
 from koopcli.koopman.predictor.dynamics.linear import Linear
 from koopcli.koopman.predictor.lifts import Observables
@@ -49,5 +50,5 @@ class Dynamics(Protocol):
 
 
 DYNAMICS: dict[str, Callable[[Packed], Dynamics]] = {
-    kind.kind: kind.unpack for kind in (Linear, Diagonal, Bilinear, Generator)
+    kind.kind: kind.unpack for kind in (Linear, Diagonal, Bilinear, Generator, ForceDriven)
 }
