@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING, Any
 from koopcli.choices import written
 from koopcli.config.changes import Changes, flat, nested, parse_set
 from koopcli.console import Console, show_table
-from koopcli.errors import UnknownNameError, UsageError
+from koopcli.errors import InvalidValueError, UnknownNameError, UsageError
 from koopcli.text import printable
 
 if TYPE_CHECKING:
@@ -67,6 +67,8 @@ class Invocation:
             settings: Simulate = simulation.settings
             return settings
         content = self.pipeline.make(predictor).content
+        if not content.plant:
+            raise InvalidValueError(f"{predictor.name} was fitted to a log: there is no simulated car behind it")
         return remembered_simulation(content.plant, content.dt)
 
     def refuse_idle(self, plan: Plan, tasks: Sequence[Task]) -> None:

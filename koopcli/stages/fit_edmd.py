@@ -156,7 +156,9 @@ def _check(task: Task) -> None:
             "use 'total'"
         )
     data = [task.input(role) for role in roles_of(dict(task.inputs))]
+    _check_once(data)
     if _measured(task):
+        _check_measured(data)
         edmd.check_increments(settings)
         return
     _check_alike(data)
@@ -177,7 +179,7 @@ def _size(basis: BasisChoice) -> str:
 
 
 def _check_alike(data: list[Task]) -> None:
-    """Refuse several trajectories that are not of one plant and period, or one of them twice."""
+    """Refuse several trajectories that are not of one plant and period."""
     names = [f.name for f in fields(Simulate) if f.name not in OF_ONE_RUN]
     for task in data[1:]:
         differing = [name for name in names if getattr(data[0].settings, name) != getattr(task.settings, name)]
@@ -186,6 +188,17 @@ def _check_alike(data: list[Task]) -> None:
                 f"{data[0].name} and {task.name} differ in {', '.join(differing)}: one predictor is of one plant, "
                 "vehicle and sampling period, so fit them apart"
             )
+
+
+def _check_measured(data: list[Task]) -> None:
+    """Refuse logs and simulated trajectories together."""
+    for task in data:
+        if task.stage != logs.STAGE_NAME:
+            raise InvalidValueError(f"{task.name} is simulated, and the others are logs: fit them apart")
+
+
+def _check_once(data: list[Task]) -> None:
+    """Refuse one of several data twice."""
     for i, task in enumerate(data):
         if task in data[:i]:
             raise InvalidValueError(f"{task.name} is named twice: its samples would count double, so name it once")

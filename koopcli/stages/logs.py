@@ -15,7 +15,7 @@ from koopcli.logs.files import runs_of
 from koopcli.logs.imported import Log
 from koopcli.logs.log import import_log
 from koopcli.logs.map import LogMap, essential_map
-from koopcli.records import Channels, Meta
+from koopcli.records import Meta
 from koopcli.stages.base import Context, Cost, Inputs, Stage, Task
 
 A_BYTE = 2e-8  # seconds
@@ -107,8 +107,6 @@ def channels(task: Task) -> tuple[int, int]:
     settings: Import = task.settings
     return len(settings.states), len(settings.inputs)
 
-
-__all__ = ["STAGE", "Channels", "Import", "channels", "imported"]
 
 STAGE = Stage(
     name=STAGE_NAME,

@@ -218,4 +218,9 @@ def test_what_makes_no_sense_is_refused(koop, log, folder):
     one_line(koop("fit-edmd", log, "--terms", "bilinear"), 3, "multiply inputs with past states too")
     one_line(koop("fit-edmd", log, "--ridge", "1"), 3, "set fit-edmd.increment_ridge")
     one_line(koop("fit-edmd", log, "--memory", "0.05"), 3, "no whole number of steps of 0.04 s")
+    one_line(koop("fit-edmd", log, log), 3, "is named twice")
+    simulated = koop("simulate", "--set", "sample.count=3", "--set", "sample.columns=1").name
+    one_line(koop("fit-edmd", log, simulated), 3, f"{simulated} is simulated, and the others are logs")
+    one_line(koop("fit-edmd", simulated, log), 3, f"{simulated} is simulated, and the others are logs")
+    one_line(koop("control", "spin", "--predictor", predictor), 3, "was fitted to a log: there is no simulated car")
     one_line(koop("evaluate", "--on", log), 2, "name the predictor to score on this log")
